@@ -1,0 +1,78 @@
+#include "colmap_graphmatch/base/thread_pool.h"
+
+#include <algorithm>
+#include <atomic>
+#include <boost/asio/post.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "colmap_graphmatch/base/errors.h"
+
+namespace colmap_graphmatch {
+
+struct ThreadPool::Workers {
+  explicit Workers(std::size_t num_threads) : pool(num_threads) {}
+  boost::asio::thread_pool pool;
+};
+
+int EffectiveNumThreads(int num_threads) {
+  if (num_threads == -1) {
+    return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  }
+  if (num_threads < 1) {
+    throw OptionsError("The number of threads is " + std::to_string(num_threads) +
+                       "; it must be at least 1, or -1 for all cores.");
+  }
+  return num_threads;
+}
+
+ThreadPool::ThreadPool(int num_threads) : num_threads_(EffectiveNumThreads(num_threads)) {
+  if (num_threads_ > 1) {
+    workers_ = std::make_unique<Workers>(static_cast<std::size_t>(num_threads_ - 1));
+  }
+}
+
+ThreadPool::~ThreadPool() = default;
+
+void ThreadPool::ParallelFor(std::size_t count, const std::function<void(std::size_t)>& body) {
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::condition_variable finished;
+  std::exception_ptr exception;
+  std::size_t num_running = 0;
+
+  const auto work = [&] {
+    try {
+      for (std::size_t i = next++; i < count; i = next++) {
+        body(i);
+      }
+    } catch (...) {
+      next = count;
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (!exception) exception = std::current_exception();
+    }
+  };
+
+  if (workers_ && count > 1) {
+    num_running = std::min(count, static_cast<std::size_t>(num_threads_)) - 1;
+    for (std::size_t i = num_running; i > 0; --i) {
+      boost::asio::post(workers_->pool, [&] {
+        work();
+        // Notified under the lock: the waiting thread destroys the condition once it can leave.
+        const std::lock_guard<std::mutex> lock(mutex);
+        --num_running;
+        finished.notify_one();
+      });
+    }
+  }
+  work();
+  std::unique_lock<std::mutex> lock(mutex);
+  finished.wait(lock, [&] { return num_running == 0; });
+  if (exception) std::rethrow_exception(exception);
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,147 @@
+#include "colmap_graphmatch/cli/console.h"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+namespace colmap_graphmatch {
+namespace {
+
+constexpr std::chrono::milliseconds kTerminalInterval(100);
+constexpr std::chrono::seconds kLogInterval(10);
+
+std::size_t TerminalWidth(int descriptor) {
+  struct winsize size = {};
+  if (::ioctl(descriptor, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+  return size.ws_col;
+}
+
+double Share(std::size_t part, double whole) {
+  return whole > 0 ? 100 * static_cast<double>(part) / whole : 0;
+}
+
+std::string FormatStage(const char* name, const StageStatistics& stage) {
+  std::string line = fmt::format("  {:<12} {:>9} tested {:>9} edges   efficiency {:.3f} {:>12}",
+                                 name, stage.num_tested, stage.num_edges, stage.Efficiency(),
+                                 FormatDuration(stage.seconds));
+  if (stage.num_known > 0) {
+    line +=
+        fmt::format("   ({} more were known, {} edges)", stage.num_known, stage.num_known_edges);
+  }
+  return line + "\n";
+}
+
+}  // namespace
+
+Console::Console(std::FILE* stream)
+    : stream_(stream), is_terminal_(::isatty(::fileno(stream)) == 1) {}
+
+Console::~Console() { ClearProgress(); }
+
+void Console::Print(const std::string& text) {
+  std::fputs(text.c_str(), stream_);
+  std::fflush(stream_);
+}
+
+void Console::ClearProgress() {
+  if (showing_progress_) Print("\n");
+  showing_progress_ = false;
+}
+
+void Console::OnInfo(const std::string& message) {
+  ClearProgress();
+  Print(message + "\n");
+}
+
+void Console::OnWarning(const std::string& message) {
+  ClearProgress();
+  Print("Warning: " + message + "\n");
+}
+
+void Console::OnProgress(const LoopProgress& progress) {
+  const Clock::time_point now = Clock::now();
+  if (!matching_) {
+    matching_ = true;
+    start_of_matching_ = now;
+    last_progress_ = now;
+    return;
+  }
+  const Clock::duration interval = is_terminal_ ? Clock::duration(kTerminalInterval) : kLogInterval;
+  if (now - last_progress_ < interval) return;
+  last_progress_ = now;
+  const std::string line =
+      FormatProgress(progress, std::chrono::duration<double>(now - start_of_matching_).count());
+  if (is_terminal_) {
+    // One column is left free: a full line would wrap on some terminals.
+    Print("\r\033[K" + line.substr(0, TerminalWidth(::fileno(stream_)) - 1));
+    showing_progress_ = true;
+  } else {
+    Print(line + "\n");
+  }
+}
+
+std::string FormatDuration(double seconds) {
+  if (seconds < 100) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 100 * 60) return fmt::format("{:.1f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+std::string FormatProgress(const LoopProgress& progress, double seconds_of_matching) {
+  const StageStatistics all = progress.sampling + progress.propagation;
+  std::string line = fmt::format(
+      "{} {}: {} tested, {} edges (efficiency {:.2f}), {} components, largest {}, {} alone",
+      progress.stage == LoopStage::kSampling ? "sampling" : "propagation", progress.iteration + 1,
+      all.num_tested, progress.num_edges, all.Efficiency(), progress.num_components,
+      progress.largest_component, progress.num_isolated);
+  if (all.num_tested > 0 && seconds_of_matching > 1) {
+    const double rate = static_cast<double>(all.num_tested) / seconds_of_matching;
+    line +=
+        fmt::format(", {:.1f} pairs/s, about {} left", rate,
+                    FormatDuration(static_cast<double>(progress.expected_remaining_tests) / rate));
+  }
+  return line;
+}
+
+std::string FormatSummary(const PipelineResult& result) {
+  const GraphMatchResult& matching = result.matching;
+  const auto num_images =
+      static_cast<double>(result.num_images - result.num_images_without_features);
+  const double num_possible = num_images * (num_images - 1) / 2;
+  const StageStatistics all = matching.sampling + matching.propagation;
+
+  std::string text = fmt::format("\nImages             {}", result.num_images);
+  if (result.num_images_without_features > 0) {
+    text += fmt::format(" ({} without features)", result.num_images_without_features);
+  }
+  text += fmt::format("\nPairs tested       {} of {:.0f} possible ({:.2f} %)\n", all.num_tested,
+                      num_possible, Share(all.num_tested, num_possible));
+  if (matching.num_seed_pairs > 0) {
+    text += fmt::format("Known before       {} pairs of other matchers or options, {} edges\n",
+                        matching.num_seed_pairs, matching.num_seed_edges);
+  }
+  if (all.num_tested + all.num_failed == 0 && all.num_known > 0) {
+    text += "                   Nothing is left to test with these options.\n";
+  }
+  text += FormatStage("sampling", matching.sampling);
+  text += FormatStage("propagation", matching.propagation);
+  text += FormatStage("both", all);
+  text +=
+      fmt::format("Matching graph     {} edges, {} components, the largest of {} images\n",
+                  matching.graph.NumEdges(), matching.num_components, matching.largest_component);
+  text += fmt::format("Without an edge    {} images\n",
+                      matching.num_isolated + result.num_images_without_features);
+  if (!matching.failed_pairs.empty()) {
+    text += fmt::format("Failed             {} pairs, see the warnings; they stay untested\n",
+                        matching.failed_pairs.size());
+  }
+  text += fmt::format(
+      "Time               {} (mixture {}, Fisher vectors {}, ranking {}, matching {})\n",
+      FormatDuration(result.total_seconds), FormatDuration(result.mixture_seconds),
+      FormatDuration(result.vectors_seconds), FormatDuration(result.ranking_seconds),
+      FormatDuration(result.matching_seconds));
+  return text;
+}
+
+}  // namespace colmap_graphmatch

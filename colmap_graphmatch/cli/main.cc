@@ -1,0 +1,92 @@
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <new>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/stop_request.h"
+#include "colmap_graphmatch/base/version.h"
+#include "colmap_graphmatch/cli/console.h"
+#include "colmap_graphmatch/cli/exit_codes.h"
+#include "colmap_graphmatch/cli/options.h"
+#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+StopRequest stop_request;
+
+void HandleSignal(int /*signal*/) { stop_request.Raise(); }
+
+void InstallSignalHandlers() {
+  struct sigaction action = {};
+  action.sa_handler = HandleSignal;
+  action.sa_flags = SA_RESTART;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  // The terminal is gone; with nohup the signal is ignored already and stays so.
+  struct sigaction hangup = {};
+  ::sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
+  // Output that nobody reads any more must not end a run of hours.
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+int Run(const CommandLine& line) {
+  InstallSignalHandlers();
+  Console console(stderr);
+  for (const std::string& option : line.unused_options) {
+    console.OnInfo("--" + option + " has no effect here.");
+  }
+  try {
+    const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
+    console.ClearProgress();
+    std::cout << FormatSummary(result) << std::flush;
+    if (result.matching.finished) return kExitSuccess;
+  } catch (const StoppedError&) {
+    // Before the first pair: there is nothing to sum up.
+  }
+  console.OnInfo(
+      "Stopped as asked. Everything verified so far is in the database; run the same command again "
+      "to go on from here.");
+  return kExitInterrupted;
+}
+
+int Main(int argc, const char* const* argv) {
+  const auto fail = [](const char* message, ExitCode code) {
+    std::cerr << "Error: " << message << std::endl;
+    return code;
+  };
+  try {
+    const CommandLine line = ParseCommandLine(argc, argv);
+    if (line.help) {
+      PrintHelp(std::cout);
+      return kExitSuccess;
+    }
+    if (line.version) {
+      std::cout << "graphmatch_matcher " << kVersion << std::endl;
+      return kExitSuccess;
+    }
+    return Run(line);
+  } catch (const OptionsError& error) {
+    return fail(error.what(), kExitOptions);
+  } catch (const DatabaseLockedError& error) {
+    return fail(error.what(), kExitDatabaseLocked);
+  } catch (const DatabaseError& error) {
+    return fail(error.what(), kExitDatabase);
+  } catch (const ColmapError& error) {
+    return fail(error.what(), kExitColmap);
+  } catch (const FileError& error) {
+    return fail(error.what(), kExitFile);
+  } catch (const std::bad_alloc&) {
+    return fail("out of memory. What was verified before is in the database.", kExitInternal);
+  } catch (const std::exception& error) {
+    return fail(error.what(), kExitInternal);
+  }
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch
+
+int main(int argc, char** argv) { return colmap_graphmatch::Main(argc, argv); }

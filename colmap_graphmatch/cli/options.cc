@@ -1,0 +1,338 @@
+#include "colmap_graphmatch/cli/options.h"
+
+#include <array>
+#include <boost/lexical_cast.hpp>
+#include <boost/program_options.hpp>
+#include <cstdint>
+#include <map>
+#include <ostream>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+namespace po = boost::program_options;
+
+enum class ValueType { kBool, kInt, kDouble, kText };
+
+// An option of COLMAP's feature matching and geometric verification that is handed on to COLMAP.
+// COLMAP moved them between groups from version to version; here every one may be given in any of
+// the groups.
+struct ColmapOption {
+  const char* name;
+  const char* group;  // The group shown in the help: the one of COLMAP 3.13 and later.
+  ValueType type;
+  const char* help;
+};
+
+constexpr std::array<const char*, 3> kGroups = {"SiftMatching", "TwoViewGeometry",
+                                                "FeatureMatching"};
+
+constexpr std::array<ColmapOption, 24> kColmapOptions = {{
+    {"use_gpu", "FeatureMatching", ValueType::kBool,
+     "match on the GPU if the installed COLMAP can (default 1)"},
+    {"gpu_index", "FeatureMatching", ValueType::kText,
+     "which GPUs, e.g. 0,1; -1: all (default -1)"},
+    {"num_threads", "FeatureMatching", ValueType::kInt,
+     "cores to use at a time, COLMAP's included; -1: all (default -1)"},
+    {"max_ratio", "SiftMatching", ValueType::kDouble,
+     "greatest ratio of the angles to the best and the second best match (COLMAP: 0.8)"},
+    {"max_distance", "SiftMatching", ValueType::kDouble,
+     "greatest angle to the best match, in radians (COLMAP: 0.7)"},
+    {"cross_check", "SiftMatching", ValueType::kBool,
+     "keep a match only if it is the best in both directions (COLMAP: 1)"},
+    {"max_num_matches", "FeatureMatching", ValueType::kInt,
+     "features of an image that are matched at most (COLMAP: 32768)"},
+    {"guided_matching", "FeatureMatching", ValueType::kBool,
+     "match again along the epipolar geometry that was found (COLMAP: 0)"},
+    {"min_num_inliers", "TwoViewGeometry", ValueType::kInt,
+     "inliers that make a pair an edge (default 15)"},
+    {"max_error", "TwoViewGeometry", ValueType::kDouble,
+     "greatest epipolar error of an inlier, in pixels (COLMAP: 4)"},
+    {"confidence", "TwoViewGeometry", ValueType::kDouble, "confidence of RANSAC (COLMAP: 0.999)"},
+    {"max_num_trials", "TwoViewGeometry", ValueType::kInt,
+     "trials of RANSAC at most (COLMAP: 10000)"},
+    {"min_inlier_ratio", "TwoViewGeometry", ValueType::kDouble,
+     "inlier ratio that RANSAC counts on (COLMAP: 0.25; 0 since 3.13)"},
+    {"multiple_models", "TwoViewGeometry", ValueType::kBool,
+     "look for several motions in a pair (COLMAP: 0)"},
+    {"compute_relative_pose", "TwoViewGeometry", ValueType::kBool,
+     "store the relative pose as well (COLMAP: 0)"},
+    {"planar_scene", "SiftMatching", ValueType::kBool, "the scene is planar (COLMAP 3.8: 0)"},
+    {"cpu_brute_force_matcher", "SiftMatching", ValueType::kBool,
+     "match exactly, without a GPU much slower (COLMAP 3.12 and later: 0)"},
+    {"detect_watermark", "TwoViewGeometry", ValueType::kBool,
+     "mark pairs that only a watermark links (COLMAP 3.13 and later: 1)"},
+    {"multiple_ignore_watermark", "TwoViewGeometry", ValueType::kBool,
+     "leave watermarks out of several motions (COLMAP 3.13 and later: 1)"},
+    {"watermark_detection_max_error", "TwoViewGeometry", ValueType::kDouble,
+     "greatest error of a watermark's inlier, in pixels (COLMAP 3.13 and later: 4)"},
+    {"filter_stationary_matches", "TwoViewGeometry", ValueType::kBool,
+     "drop matches at the same place in both images (COLMAP 3.13 and later: 0)"},
+    {"stationary_matches_max_error", "TwoViewGeometry", ValueType::kDouble,
+     "what the same place means, in pixels (COLMAP 3.13 and later: 4)"},
+    {"use_degensac", "TwoViewGeometry", ValueType::kBool, "use DEGENSAC (COLMAP 4: 0)"},
+    {"use_sampson_refinement", "TwoViewGeometry", ValueType::kBool,
+     "refine by Sampson errors (COLMAP 4.2: 1)"},
+}};
+
+// Options of vocab_tree_matcher that only make sense with a vocabulary tree, or with COLMAP's log.
+constexpr std::array<const char*, 13> kUnusedOptions = {
+    "log_to_stderr",
+    "log_target",
+    "log_path",
+    "log_level",
+    "log_severity",
+    "log_color",
+    "VocabTreeMatching.vocab_tree_path",
+    "VocabTreeMatching.num_images",
+    "VocabTreeMatching.num_nearest_neighbors",
+    "VocabTreeMatching.num_checks",
+    "VocabTreeMatching.num_images_after_verification",
+    "VocabTreeMatching.max_num_features",
+    "VocabTreeMatching.num_threads"};
+
+constexpr unsigned kLineLength = 100;
+constexpr unsigned kHelpLength = 50;
+
+// What the user may write for an enumeration.
+template <typename Enum>
+using Names = std::map<std::string, Enum>;
+
+const Names<GraphMatchOptions::SamplingSchedule> kSchedules = {
+    {"floor", GraphMatchOptions::SamplingSchedule::kFloor},
+    {"round", GraphMatchOptions::SamplingSchedule::kRound},
+    {"carry", GraphMatchOptions::SamplingSchedule::kCarry}};
+const Names<GraphMatchOptions::PropagationDistance> kDistances = {
+    {"source", GraphMatchOptions::PropagationDistance::kSource},
+    {"neighbor", GraphMatchOptions::PropagationDistance::kNeighbor}};
+const Names<ImageVectorOptions::FeatureSelection> kSelections = {
+    {"largest", ImageVectorOptions::FeatureSelection::kLargestScales},
+    {"random", ImageVectorOptions::FeatureSelection::kRandom}};
+
+// An option whose value is one of some names, bound to an enumeration.
+template <typename Enum>
+po::typed_value<std::string>* OneOf(const std::string& option, const Names<Enum>& names,
+                                    Enum* field) {
+  std::string initial;
+  std::string allowed;
+  for (const auto& [name, value] : names) {
+    if (value == *field) initial = name;
+    allowed += (allowed.empty() ? "" : ", ") + name;
+  }
+  return po::value<std::string>()->default_value(initial)->notifier(
+      [option, &names, allowed, field](const std::string& text) {
+        const auto found = names.find(text);
+        if (found == names.end()) {
+          throw OptionsError("--" + option + " is \"" + text + "\"; it must be one of " + allowed +
+                             ".");
+        }
+        *field = found->second;
+      });
+}
+
+template <typename T>
+po::typed_value<T>* Field(T* field) {
+  return po::value<T>(field)->default_value(*field);
+}
+
+class Options {
+ public:
+  Options() {
+    PipelineOptions& p = line_.pipeline;
+    po::options_description general("General", kLineLength, kHelpLength);
+    general.add_options()("help,h", "print this help")("version", "print the version")(
+        "database_path", po::value<std::string>(),
+        "the COLMAP database with the features; the matches are written to it")(
+        "colmap_path", Field(&p.colmap_path), "the COLMAP program: a path, or a name on PATH")(
+        "random_seed", Field(&p.seed),
+        "of this program's random choices; COLMAP's CPU matching has its own");
+
+    po::options_description graph("GraphMatch: which pairs are tested", kLineLength, kHelpLength);
+    graph.add_options()(
+        "GraphMatching.number_sample_iterations", Field(&p.graph.number_sample_iterations),
+        "iterations (>= 0) that sample before propagating; later ones only propagate")(
+        "GraphMatching.max_tests_for_sampling", Field(&p.graph.max_tests_for_sampling),
+        "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N "
+        "images. "
+        "More finds weaker links and costs up to N tests for each")(
+        "GraphMatching.max_num_neighbors", Field(&p.graph.max_num_neighbors),
+        "neighbours (>= 1) after which an image looks for no more itself. Fewer thins dense "
+        "scenes")("GraphMatching.num_to_propagate", Field(&p.graph.num_to_propagate),
+                  "images (>= 0) that each neighbour hands on to an image in an iteration")(
+        "GraphMatching.sampling_schedule",
+        OneOf("GraphMatching.sampling_schedule", kSchedules, &p.graph.sampling_schedule),
+        "tests an iteration: budget / iterations as floor, round, or carry (spends it all)")(
+        "GraphMatching.count_incoming_tests", Field(&p.graph.count_incoming_tests),
+        "tests drawn by other images count against an image's budget, too")(
+        "GraphMatching.propagation_distance",
+        OneOf("GraphMatching.propagation_distance", kDistances, &p.graph.propagation_distance),
+        "rank a neighbour's neighbours by their distance to the image itself (source) or to the "
+        "neighbor")("GraphMatching.propagate_untested_only",
+                    Field(&p.graph.propagate_untested_only),
+                    "take the best among the untested; 0: among all, then drop the tested")(
+        "GraphMatching.propagate_from_new_edges_only",
+        Field(&p.graph.propagate_from_new_edges_only), "propagate along each edge only once")(
+        "GraphMatching.stop_sampling_without_edges", Field(&p.graph.stop_sampling_without_edges),
+        "end sampling after an iteration that found no edge");
+
+    po::options_description vectors("GraphMatch: how images are described", kLineLength,
+                                    kHelpLength);
+    vectors.add_options()("GraphMatching.num_components", Field(&p.vectors.gmm.num_components),
+                          "Gaussians (>= 1) of the mixture; time and memory grow in proportion")(
+        "GraphMatching.max_num_features", Field(&p.vectors.max_num_features),
+        "features (>= 1) of an image that are encoded at most")(
+        "GraphMatching.feature_selection",
+        OneOf("GraphMatching.feature_selection", kSelections, &p.vectors.feature_selection),
+        "which, if it has more: those of the largest scales, or random ones")(
+        "GraphMatching.num_training_descriptors", Field(&p.vectors.num_training_descriptors),
+        "descriptors (>= 1) that the mixture is learnt from");
+
+    po::options_description work("GraphMatch: how COLMAP is run", kLineLength, kHelpLength);
+    work.add_options()("GraphMatching.num_processes", Field(&p.verification.num_processes),
+                       "COLMAP processes at a time; 0: one a core without a GPU, else one")(
+        "GraphMatching.max_pairs_per_shard", Field(&p.verification.max_pairs_per_shard),
+        "pairs (>= 1) that COLMAP gets at a time; kill -9 loses at most this much work a process")(
+        "GraphMatching.timeout_per_pair", Field(&p.verification.timeout_per_pair),
+        "seconds (> 0) a pair after which COLMAP counts as hanging")(
+        "GraphMatching.lock_timeout", Field(&p.verification.lock_timeout),
+        "seconds (>= 0) to wait while another program locks the database")(
+        "GraphMatching.work_path", po::value<std::string>(),
+        "where temporary files go (default: $TMPDIR or /tmp); some 100 MB a process");
+
+    po::options_description colmap(
+        "COLMAP's own options, accepted in each of the groups SiftMatching, TwoViewGeometry and "
+        "FeatureMatching",
+        kLineLength, kHelpLength);
+    for (const ColmapOption& option : kColmapOptions) {
+      for (const char* group : kGroups) {
+        const std::string name = std::string(group) + "." + option.name;
+        (group == std::string(option.group) ? colmap : hidden_)
+            .add_options()(name.c_str(), po::value<std::string>(), option.help);
+      }
+    }
+    hidden_.add_options()("default_random_seed", po::value<std::uint64_t>(), "");
+    for (const char* name : kUnusedOptions) {
+      hidden_.add_options()(name, po::value<std::string>(), "");
+    }
+    visible_.add(general).add(graph).add(vectors).add(work).add(colmap);
+  }
+
+  CommandLine Parse(int argc, const char* const* argv) {
+    po::options_description all;
+    all.add(visible_).add(hidden_);
+    po::variables_map values;
+    try {
+      po::store(po::parse_command_line(argc, argv, all), values);
+      line_.help = values.count("help") > 0;
+      line_.version = values.count("version") > 0;
+      if (line_.help || line_.version) return line_;
+      po::notify(values);
+    } catch (const po::error& error) {
+      throw OptionsError(std::string(error.what()) +
+                         ". `graphmatch_matcher -h` lists the options.");
+    }
+    if (values.count("database_path") == 0) {
+      throw OptionsError(
+          "--database_path is missing: the COLMAP database with the features. `graphmatch_matcher "
+          "-h` lists the options.");
+    }
+    // The name that random_seed has since COLMAP 3.13.
+    if (values.count("default_random_seed") > 0) {
+      line_.pipeline.seed = values["default_random_seed"].as<std::uint64_t>();
+    }
+    line_.pipeline.database_path = values["database_path"].as<std::string>();
+    if (values.count("GraphMatching.work_path") > 0) {
+      line_.pipeline.work_path = values["GraphMatching.work_path"].as<std::string>();
+    }
+    for (const ColmapOption& option : kColmapOptions) ReadColmapOption(option, values);
+    for (const char* name : kUnusedOptions) {
+      if (values.count(name) > 0) line_.unused_options.emplace_back(name);
+    }
+    line_.pipeline.verification.num_threads = line_.pipeline.num_threads;
+    line_.pipeline.Check();
+    return line_;
+  }
+
+  const po::options_description& Visible() const { return visible_; }
+
+ private:
+  void ReadColmapOption(const ColmapOption& option, const po::variables_map& values) {
+    std::string given;
+    std::string text;
+    for (const char* group : kGroups) {
+      const std::string name = std::string(group) + "." + option.name;
+      if (values.count(name) == 0) continue;
+      const auto value = values[name].as<std::string>();
+      if (!given.empty() && value != text) {
+        throw OptionsError("--" + given + " " + text + " and --" + name + " " + value +
+                           " are the same option with different values. Give one of them.");
+      }
+      given = name;
+      text = value;
+    }
+    if (given.empty()) return;
+
+    PipelineOptions& p = line_.pipeline;
+    try {
+      const std::string name = option.name;
+      if (option.type == ValueType::kBool) {
+        const bool value = ParseBool(text);
+        if (name == "use_gpu") {
+          p.verification.use_gpu = value;
+          return;
+        }
+        text = value ? "1" : "0";
+      } else if (option.type == ValueType::kInt) {
+        const int value = boost::lexical_cast<int>(text);
+        if (name == "num_threads") {
+          p.num_threads = value;
+          return;
+        }
+        if (name == "min_num_inliers") {
+          p.verification.min_num_inliers = value;
+          return;
+        }
+      } else if (option.type == ValueType::kDouble) {
+        boost::lexical_cast<double>(text);
+      }
+      p.verification.colmap_options[name] = text;
+    } catch (const boost::bad_lexical_cast&) {
+      static const std::map<ValueType, std::string> kTypes = {{ValueType::kBool, "0 or 1"},
+                                                              {ValueType::kInt, "an integer"},
+                                                              {ValueType::kDouble, "a number"}};
+      throw OptionsError("--" + given + " is \"" + text + "\"; it must be " +
+                         kTypes.at(option.type) + ".");
+    }
+  }
+
+  static bool ParseBool(const std::string& text) {
+    if (text == "true" || text == "yes" || text == "on") return true;
+    if (text == "false" || text == "no" || text == "off") return false;
+    return boost::lexical_cast<bool>(text);
+  }
+
+  CommandLine line_;
+  po::options_description visible_{kLineLength, kHelpLength};
+  po::options_description hidden_;
+};
+
+}  // namespace
+
+CommandLine ParseCommandLine(int argc, const char* const* argv) {
+  return Options().Parse(argc, argv);
+}
+
+void PrintHelp(std::ostream& stream) {
+  stream
+      << "graphmatch_matcher --database_path DATABASE [options]\n\n"
+         "Finds which images of a COLMAP database show the same place, has COLMAP match and verify "
+         "them, and\nwrites the two-view geometries to the database, ready for `colmap mapper`. A "
+         "replacement for\n`colmap vocab_tree_matcher` that needs no vocabulary tree.\n\n"
+         "Options"
+      << Options().Visible() << '\n';
+}
+
+}  // namespace colmap_graphmatch

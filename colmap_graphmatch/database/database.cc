@@ -1,0 +1,318 @@
+#include "colmap_graphmatch/database/database.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <map>
+#include <system_error>
+
+#include "colmap_graphmatch/base/errors.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// The first schema in which an unset matrix is NULL and zeros would count as set (COLMAP 3.9).
+constexpr std::int64_t kFirstVersionWithNull = 3900;
+
+// Of kGeometryColumns.
+constexpr std::size_t kQvecColumn = 3;
+constexpr std::size_t kTvecColumn = 4;
+
+// FeatureExtractorType::SIFT in COLMAP 4 (src/colmap/feature/types.h).
+constexpr std::int64_t kSiftType = 0;
+
+const std::filesystem::path& ExistingFile(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (error == std::errc::permission_denied) {
+    throw DatabaseError("You may not look at " + path.string() +
+                        ": permission denied. Run this as its owner, or copy the database.");
+  }
+  if (!std::filesystem::exists(status)) {
+    throw DatabaseError("There is no database at " + path.string() +
+                        ". Make one with `colmap feature_extractor --database_path " +
+                        path.string() + " --image_path IMAGES`.");
+  }
+  if (std::filesystem::is_directory(status)) {
+    throw DatabaseError(path.string() + " is a directory. Give the path of the database.db in it.");
+  }
+  if (std::filesystem::is_regular_file(status) && std::filesystem::file_size(path, error) == 0 &&
+      !error) {
+    throw DatabaseError(path.string() +
+                        " is an empty file. Run `colmap feature_extractor` on it first.");
+  }
+  return path;
+}
+
+bool Contains(const std::vector<std::string>& values, const std::string& value) {
+  return std::find(values.begin(), values.end(), value) != values.end();
+}
+
+std::string Join(const std::vector<std::string>& values) {
+  std::string joined;
+  for (const std::string& value : values) {
+    if (!joined.empty()) joined += ", ";
+    joined += value;
+  }
+  return joined;
+}
+
+bool AllZero(const sqlite::Blob& blob) {
+  return std::all_of(blob.begin(), blob.end(), [](std::uint8_t byte) { return byte == 0; });
+}
+
+}  // namespace
+
+float Keypoints::Scale(std::size_t row) const {
+  const float* keypoint = data.data() + row * num_cols;
+  switch (num_cols) {
+    case 4:
+      return keypoint[2];
+    case 6:
+      return (std::hypot(keypoint[2], keypoint[4]) + std::hypot(keypoint[3], keypoint[5])) / 2;
+    default:
+      return 0;
+  }
+}
+
+bool IsEdge(std::size_t num_inliers, int config, std::size_t min_num_inliers) {
+  return num_inliers >= std::max<std::size_t>(1, min_num_inliers) && config > 1 && config != 7;
+}
+
+Database::Database(const std::filesystem::path& path, sqlite::Access access,
+                   double lock_timeout_seconds)
+    : connection_(ExistingFile(path), access, lock_timeout_seconds) {
+  CheckSchema();
+}
+
+void Database::CheckSchema() {
+  const std::map<std::string, std::vector<std::string>> needed = {
+      {"cameras", {"camera_id", "model", "width", "height", "params"}},
+      {"images", {"image_id", "name", "camera_id"}},
+      {"keypoints", {"image_id", "rows", "cols", "data"}},
+      {"descriptors", {"image_id", "rows", "cols", "data"}},
+      {"matches", {"pair_id", "rows", "cols", "data"}},
+      {"two_view_geometries", {"pair_id", "rows", "cols", "data", "config", "F", "E", "H"}}};
+  for (const auto& [table, columns] : needed) {
+    const std::vector<std::string> existing = connection_.Columns(table);
+    for (const std::string& column : columns) {
+      if (!Contains(existing, column)) {
+        throw DatabaseError(Path().string() + " is not a database of COLMAP 3.8 or later: " +
+                            (existing.empty() ? "it has no table " + table
+                                              : "its table " + table + " has no column " + column) +
+                            ". Give the database.db that `colmap feature_extractor` wrote.");
+      }
+    }
+  }
+  const std::vector<std::string> existing = connection_.Columns("two_view_geometries");
+  for (std::size_t i = 0; i < kGeometryColumns.size(); ++i) {
+    if (Contains(existing, kGeometryColumns[i])) geometry_columns_.push_back(i);
+  }
+  descriptors_have_type_ = Contains(connection_.Columns("descriptors"), "type");
+
+  sqlite::Statement version(connection_, "PRAGMA user_version");
+  version.Step();
+  unset_is_null_ = version.Int(0) >= kFirstVersionWithNull;
+}
+
+std::vector<ImageRecord> Database::ReadImages() {
+  // The lengths of blobs are in the rows' headers: this reads no descriptor.
+  sqlite::Statement select(
+      connection_,
+      "SELECT images.image_id, images.name, descriptors.rows, descriptors.cols, "
+      "length(descriptors.data), keypoints.rows, keypoints.cols, length(keypoints.data), " +
+          std::string(descriptors_have_type_ ? "descriptors.type" : "0") +
+          " FROM images LEFT JOIN descriptors ON descriptors.image_id = images.image_id "
+          "LEFT JOIN keypoints ON keypoints.image_id = images.image_id ORDER BY images.image_id");
+  std::vector<ImageRecord> images;
+  bool any_features = false;
+  while (select.Step()) {
+    const std::int64_t id = select.Int(0);
+    const std::int64_t rows = select.Int(2);
+    const std::int64_t cols = select.Int(3);
+    const std::int64_t size = select.Int(4);
+    const std::int64_t keypoint_rows = select.Int(5);
+    const std::int64_t keypoint_cols = select.Int(6);
+    const std::int64_t keypoint_size = select.Int(7);
+
+    ImageRecord image;
+    image.name = select.Text(1);
+    const auto fail = [&](const std::string& problem) {
+      throw DatabaseError("Image \"" + image.name + "\" (id " + std::to_string(id) + ") in " +
+                          Path().string() + ": " + problem +
+                          " Delete the image's rows or extract its features again.");
+    };
+    if (id < 1 || static_cast<PairId>(id) >= kMaxNumImages) {
+      fail("the id is outside COLMAP's range of 1 to 2147483646.");
+    }
+    image.id = static_cast<ImageId>(id);
+
+    if (!select.IsNull(2) && rows != 0) {
+      const std::string shape = std::to_string(rows) + " x " + std::to_string(cols);
+      if (select.Int(8) != kSiftType || (rows > 0 && cols > 0 && size / rows / cols == 4)) {
+        fail("its descriptors (" + shape +
+             ") are not SIFT descriptors of one byte an entry; ALIKED and other floating-point "
+             "features cannot be matched by this program.");
+      }
+      if (cols != kDescriptorDim) {
+        fail("its descriptors are " + shape + "; SIFT descriptors have 128 columns.");
+      }
+      // Before the product, which a corrupt number of rows could overflow.
+      if (rows < 0 || rows > size || rows * cols != size) {
+        fail("its descriptors are said to be " + shape + " bytes, but the blob has " +
+             std::to_string(size) + ".");
+      }
+      if (keypoint_rows != rows) {
+        fail("it has " + std::to_string(rows) + " descriptors but " +
+             std::to_string(keypoint_rows) + " keypoints.");
+      }
+      if (keypoint_cols != 2 && keypoint_cols != 4 && keypoint_cols != 6) {
+        fail("its keypoints have " + std::to_string(keypoint_cols) +
+             " columns; COLMAP stores 2, 4 or 6.");
+      }
+      if (keypoint_rows * keypoint_cols * 4 != keypoint_size) {
+        fail("its keypoints are said to be " + std::to_string(keypoint_rows) + " x " +
+             std::to_string(keypoint_cols) + " floats, but the blob has " +
+             std::to_string(keypoint_size) + " bytes.");
+      }
+      image.num_features = static_cast<std::size_t>(rows);
+      any_features = true;
+    }
+    images.push_back(std::move(image));
+  }
+  if (images.empty()) {
+    throw DatabaseError(Path().string() +
+                        " has no images. Run `colmap feature_extractor` on it first.");
+  }
+  if (!any_features) {
+    throw DatabaseError("None of the " + std::to_string(images.size()) + " images in " +
+                        Path().string() +
+                        " has features. Run `colmap feature_extractor` on it first.");
+  }
+  return images;
+}
+
+std::vector<ImageRecord> WithFeatures(const std::vector<ImageRecord>& images) {
+  std::vector<ImageRecord> with_features;
+  std::copy_if(images.begin(), images.end(), std::back_inserter(with_features),
+               [](const ImageRecord& image) { return image.num_features > 0; });
+  return with_features;
+}
+
+Descriptors Database::ReadDescriptors(ImageId image_id) {
+  sqlite::Statement select(connection_, "SELECT rows, data FROM descriptors WHERE image_id = ?1");
+  select.Bind(1, std::int64_t{image_id});
+  Descriptors descriptors;
+  if (!select.Step()) return descriptors;
+  descriptors.num_rows = static_cast<std::size_t>(select.Int(0));
+  descriptors.data = select.CopyBlob(1);
+  if (descriptors.num_rows * kDescriptorDim != descriptors.data.size()) {
+    throw DatabaseError("The descriptors of the image with id " + std::to_string(image_id) +
+                        " in " + Path().string() +
+                        " changed while they were read. Is another program writing "
+                        "to the database?");
+  }
+  return descriptors;
+}
+
+Keypoints Database::ReadKeypoints(ImageId image_id) {
+  sqlite::Statement select(connection_,
+                           "SELECT rows, cols, data FROM keypoints WHERE image_id = ?1");
+  select.Bind(1, std::int64_t{image_id});
+  Keypoints keypoints;
+  if (!select.Step()) return keypoints;
+  keypoints.num_rows = static_cast<std::size_t>(select.Int(0));
+  keypoints.num_cols = static_cast<std::size_t>(select.Int(1));
+  const std::size_t size = select.Size(2);
+  if (keypoints.num_rows * keypoints.num_cols * sizeof(float) != size) {
+    throw DatabaseError("The keypoints of the image with id " + std::to_string(image_id) + " in " +
+                        Path().string() +
+                        " changed while they were read. Is another program writing "
+                        "to the database?");
+  }
+  keypoints.data.resize(size / sizeof(float));
+  if (size > 0) std::memcpy(keypoints.data.data(), select.Data(2), size);
+  return keypoints;
+}
+
+std::vector<TestedPair> Database::ReadTestedPairs() {
+  sqlite::Statement select(
+      connection_, "SELECT pair_id, rows, config FROM two_view_geometries ORDER BY pair_id");
+  std::vector<TestedPair> tested;
+  while (select.Step()) {
+    TestedPair pair;
+    const auto pair_id = static_cast<PairId>(select.Int(0));
+    pair.pair = DecodePair(pair_id);
+    // Keys that COLMAP never writes, e.g. with the larger id first, name no pair.
+    if (pair.pair.id1 == 0 || EncodePair(pair.pair) != pair_id) continue;
+    pair.num_inliers = static_cast<std::size_t>(std::max<std::int64_t>(0, select.Int(1)));
+    pair.config = static_cast<int>(select.Int(2));
+    tested.push_back(pair);
+  }
+  return tested;
+}
+
+void Database::CheckWritable() { const sqlite::Transaction rolled_back(connection_); }
+
+void Database::WritePairs(const std::vector<PairRows>& pairs) {
+  std::vector<std::string> columns = {"pair_id", "rows", "cols", "data", "config"};
+  std::string parameters = "?1, ?2, ?3, ?4, ?5";
+  for (const std::size_t i : geometry_columns_) {
+    columns.emplace_back(kGeometryColumns[i]);
+    parameters += ", ?" + std::to_string(columns.size());
+  }
+  sqlite::Transaction transaction(connection_);
+  sqlite::Statement exists(connection_, "SELECT 1 FROM two_view_geometries WHERE pair_id = ?1");
+  sqlite::Statement insert_matches(
+      connection_,
+      "INSERT OR REPLACE INTO matches(pair_id, rows, cols, data) VALUES(?1, ?2, ?3, ?4)");
+  sqlite::Statement insert_geometry(
+      connection_,
+      "INSERT INTO two_view_geometries(" + Join(columns) + ") VALUES(" + parameters + ")");
+  for (const PairRows& pair : pairs) {
+    const auto pair_id = static_cast<std::int64_t>(EncodePair(pair.pair));
+    const bool tested_by_others = exists.Bind(1, pair_id).Step();
+    exists.Reset();
+    if (tested_by_others) continue;
+
+    insert_matches.Bind(1, pair_id)
+        .Bind(2, static_cast<std::int64_t>(pair.num_matches))
+        .Bind(3, std::int64_t{2})
+        .Bind(4, pair.matches)
+        .Run();
+
+    insert_geometry.Bind(1, pair_id)
+        .Bind(2, static_cast<std::int64_t>(pair.num_inliers))
+        .Bind(3, std::int64_t{2})
+        .Bind(4, pair.inliers)
+        .Bind(5, std::int64_t{pair.config});
+    // Vectors of zeros for databases of COLMAP 3.8, whose reader expects a matrix wherever there
+    // are inliers: qvec has 4 doubles, tvec 3, the matrices 9.
+    static const sqlite::Blob kZeros9(72), kZeros4(32), kZeros3(24);
+    const auto is_unset = [&pair](std::size_t i) {
+      return !pair.geometry[i].has_value() || AllZero(*pair.geometry[i]);
+    };
+    int parameter = 6;
+    for (const std::size_t i : geometry_columns_) {
+      const std::optional<sqlite::Blob>& value = pair.geometry[i];
+      // A pose is set as a whole: no rotation is all zeros, but a translation can be.
+      const bool unset =
+          i == kTvecColumn ? is_unset(kQvecColumn) || !value.has_value() : is_unset(i);
+      if (!unset) {
+        insert_geometry.Bind(parameter, *value);
+      } else if (unset_is_null_ || pair.num_inliers == 0) {
+        insert_geometry.BindNull(parameter);
+      } else {
+        insert_geometry.Bind(parameter, i == kQvecColumn   ? kZeros4
+                                        : i == kTvecColumn ? kZeros3
+                                                           : kZeros9);
+      }
+      ++parameter;
+    }
+    insert_geometry.Run();
+  }
+  transaction.Commit();
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/database/features.h"
+#include "colmap_graphmatch/database/sqlite.h"
+
+namespace colmap_graphmatch {
+
+struct ImageRecord {
+  ImageId id = 0;
+  std::string name;
+  std::size_t num_features = 0;  // 0 also for an image whose features were never extracted.
+};
+
+// Those of the images that have features.
+std::vector<ImageRecord> WithFeatures(const std::vector<ImageRecord>& images);
+
+// A row of `two_view_geometries` as far as the matching graph needs it.
+struct TestedPair {
+  ImagePair pair;
+  std::size_t num_inliers = 0;
+  int config = 0;
+};
+
+// The matrices of a row of `two_view_geometries`, in the order of PairRows::geometry. A column that
+// a database does not have is left out of what is read from and written to it.
+inline constexpr std::array<const char*, 7> kGeometryColumns = {"F",    "E",       "H",      "qvec",
+                                                                "tvec", "camera1", "camera2"};
+
+// What COLMAP stores for a tested pair. Matches are num x 2 uint32 feature indices, row-major, the
+// feature of pair.id1 first; no bytes at all where there are no rows.
+struct PairRows {
+  ImagePair pair;
+  std::size_t num_matches = 0;
+  sqlite::Blob matches;
+  std::size_t num_inliers = 0;
+  sqlite::Blob inliers;
+  int config = 0;
+  std::array<std::optional<sqlite::Blob>, kGeometryColumns.size()> geometry;
+};
+
+// True if COLMAP counts such a pair as an edge of the matching graph: enough inliers, and not
+// undefined (0), degenerate (1) or a watermark (7).
+bool IsEdge(std::size_t num_inliers, int config, std::size_t min_num_inliers);
+
+// The database of a user, made by any COLMAP from 3.8 on. Opening checks that it is one. Nothing in
+// it is changed but by WritePairs. Not thread-safe: every thread opens its own.
+//
+// Errors: DatabaseError, DatabaseLockedError (see sqlite.h); the message names the file and, where
+// one is at fault, the image.
+class Database {
+ public:
+  // lock_timeout_seconds: how long to wait for the locks of other processes before giving up.
+  Database(const std::filesystem::path& path, sqlite::Access access, double lock_timeout_seconds);
+
+  const std::filesystem::path& Path() const { return connection_.Path(); }
+
+  // All images, by ascending id. Throws if there is none, if none has features, or if the features
+  // of any image are not SIFT descriptors of 128 bytes with as many keypoints.
+  std::vector<ImageRecord> ReadImages();
+
+  // The features of one image; no rows if it has none.
+  Descriptors ReadDescriptors(ImageId image_id);
+  Keypoints ReadKeypoints(ImageId image_id);
+
+  // The pairs that have a row in `two_view_geometries`, ascending. (COLMAP's matchers also ask for
+  // a row in `matches` before they skip a pair; what is verified is never verified again here.)
+  std::vector<TestedPair> ReadTestedPairs();
+
+  // Takes the write lock for a moment: that the database cannot be written should not be learnt
+  // late.
+  void CheckWritable();
+
+  // Adds pairs in one transaction: after an error nothing of them is in the database. A pair that
+  // another program has tested in the meantime is left as that program wrote it. Matrices are
+  // stored the way the COLMAP that made this database marks unset ones: zeros up to 3.8, NULL
+  // since.
+  void WritePairs(const std::vector<PairRows>& pairs);
+
+ private:
+  void CheckSchema();
+
+  sqlite::Connection connection_;
+  bool unset_is_null_ = true;
+  std::vector<std::size_t> geometry_columns_;  // The indices in kGeometryColumns that exist here.
+  bool descriptors_have_type_ = false;
+};
+
+}  // namespace colmap_graphmatch

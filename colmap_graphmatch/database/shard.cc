@@ -1,0 +1,159 @@
+#include "colmap_graphmatch/database/shard.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/sqlite.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// The largest value of TwoViewGeometry::ConfigurationType (MULTIPLE).
+constexpr int kMaxConfig = 8;
+
+// "INSERT INTO table(common columns) SELECT common columns FROM source.table", so that databases of
+// different versions of COLMAP can be copied into each other. Columns without a counterpart take
+// their default; replacements give the expression for a column that is not to be copied as it is.
+std::string CopyTable(sqlite::Connection& shard, const std::string& table,
+                      const std::map<std::string, std::string>& replacements) {
+  const std::vector<std::string> target = shard.Columns(table);
+  const std::vector<std::string> source = shard.Columns(table, "source");
+  std::string names;
+  std::string values;
+  for (const std::string& column : target) {
+    const auto replacement = replacements.find(column);
+    const bool in_source = std::find(source.begin(), source.end(), column) != source.end();
+    if (!in_source && replacement == replacements.end()) continue;
+    const std::string separator = names.empty() ? "" : ", ";
+    names += separator + column;
+    values += separator + (replacement != replacements.end() ? replacement->second : column);
+  }
+  return "INSERT INTO main." + table + "(" + names + ") SELECT " + values + " FROM source." + table;
+}
+
+sqlite::Blob CheckedMatches(const sqlite::Statement& row, int rows_column, int cols_column,
+                            int data_column, std::size_t num_features1, std::size_t num_features2) {
+  const std::int64_t rows = row.Int(rows_column);
+  sqlite::Blob matches = row.CopyBlob(data_column);
+  const std::size_t bytes_per_row = 2 * sizeof(std::uint32_t);
+  // Divided, not multiplied: a nonsensical number of rows must not overflow into a right one.
+  if (rows < 0 || matches.size() % bytes_per_row != 0 ||
+      matches.size() / bytes_per_row != static_cast<std::size_t>(rows) ||
+      (rows > 0 && row.Int(cols_column) != 2)) {
+    throw DatabaseError("a blob of matches of the wrong size");
+  }
+  for (std::size_t offset = 0; offset < matches.size(); offset += bytes_per_row) {
+    std::array<std::uint32_t, 2> match = {};
+    std::memcpy(match.data(), matches.data() + offset, bytes_per_row);
+    if (match[0] >= num_features1 || match[1] >= num_features2) {
+      throw DatabaseError("a match of features that the images do not have");
+    }
+  }
+  return matches;
+}
+
+}  // namespace
+
+std::string ShardImageName(ImageId image_id) { return std::to_string(image_id); }
+
+void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
+               double lock_timeout_seconds, const std::vector<ImagePair>& pairs) {
+  sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, lock_timeout_seconds);
+  shard.AttachReadOnly(database_path, "source");
+  // A shard is thrown away when anything goes wrong: it need not survive a crash.
+  shard.Execute("PRAGMA main.synchronous = OFF");
+  shard.Execute("CREATE TEMP TABLE ids(image_id INTEGER PRIMARY KEY)");
+  shard.Execute("CREATE TEMP TABLE pair_ids(pair_id INTEGER PRIMARY KEY)");
+
+  sqlite::Transaction transaction(shard);
+  sqlite::Statement add_id(shard, "INSERT OR IGNORE INTO ids VALUES(?1)");
+  sqlite::Statement add_pair(shard, "INSERT OR IGNORE INTO pair_ids VALUES(?1)");
+  for (const ImagePair& pair : pairs) {
+    add_id.Bind(1, std::int64_t{pair.id1}).Run();
+    add_id.Bind(1, std::int64_t{pair.id2}).Run();
+    add_pair.Bind(1, static_cast<std::int64_t>(EncodePair(pair))).Run();
+  }
+  const std::string of_images = " WHERE image_id IN (SELECT image_id FROM ids)";
+  shard.Execute(CopyTable(shard, "cameras", {}) +
+                " WHERE camera_id IN (SELECT camera_id FROM source.images" + of_images + ")");
+  shard.Execute(CopyTable(shard, "images", {{"name", "CAST(image_id AS TEXT)"}}) + of_images);
+  shard.Execute(CopyTable(shard, "keypoints", {}) + of_images);
+  const std::vector<std::string> source_columns = shard.Columns("descriptors", "source");
+  const bool typed =
+      std::find(source_columns.begin(), source_columns.end(), "type") != source_columns.end();
+  // 0 is SIFT, the only type that versions without the column had.
+  shard.Execute(CopyTable(shard, "descriptors",
+                          typed ? std::map<std::string, std::string>{}
+                                : std::map<std::string, std::string>{{"type", "0"}}) +
+                of_images);
+  shard.Execute(CopyTable(shard, "matches", {}) +
+                " WHERE pair_id IN (SELECT pair_id FROM pair_ids) AND pair_id NOT IN "
+                "(SELECT pair_id FROM source.two_view_geometries)");
+  transaction.Commit();
+}
+
+std::vector<PairRows> ReadShard(const std::filesystem::path& shard_path,
+                                const std::vector<ImagePair>& pairs,
+                                const std::map<ImageId, std::size_t>& num_features) {
+  sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, 0);
+  const std::vector<std::string> existing = shard.Columns("two_view_geometries");
+  std::string columns = "rows, cols, data, config";
+  std::vector<std::size_t> geometry_columns;
+  for (std::size_t i = 0; i < kGeometryColumns.size(); ++i) {
+    if (std::find(existing.begin(), existing.end(), kGeometryColumns[i]) == existing.end())
+      continue;
+    columns += std::string(", ") + kGeometryColumns[i];
+    geometry_columns.push_back(i);
+  }
+  sqlite::Statement select_matches(shard,
+                                   "SELECT rows, cols, data FROM matches WHERE pair_id = ?1");
+  sqlite::Statement select_geometry(
+      shard, "SELECT " + columns + " FROM two_view_geometries WHERE pair_id = ?1");
+
+  std::vector<PairRows> results;
+  results.reserve(pairs.size());
+  for (const ImagePair& pair : pairs) {
+    const auto pair_id = static_cast<std::int64_t>(EncodePair(pair));
+    PairRows rows;
+    rows.pair = pair;
+    try {
+      if (!select_matches.Bind(1, pair_id).Step() || !select_geometry.Bind(1, pair_id).Step()) {
+        throw DatabaseError("no result");
+      }
+      const std::size_t num1 = num_features.at(pair.id1);
+      const std::size_t num2 = num_features.at(pair.id2);
+      rows.matches = CheckedMatches(select_matches, 0, 1, 2, num1, num2);
+      rows.num_matches = static_cast<std::size_t>(select_matches.Int(0));
+      rows.inliers = CheckedMatches(select_geometry, 0, 1, 2, num1, num2);
+      rows.num_inliers = static_cast<std::size_t>(select_geometry.Int(0));
+      const std::int64_t config = select_geometry.Int(3);
+      if (config < 0 || config > kMaxConfig) {
+        throw DatabaseError("the unknown configuration " + std::to_string(config));
+      }
+      rows.config = static_cast<int>(config);
+      int column = 4;
+      for (const std::size_t i : geometry_columns) {
+        if (!select_geometry.IsNull(column)) {
+          rows.geometry[i] = select_geometry.CopyBlob(column);
+          const std::size_t expected = i < 3 ? 72 : i == 3 ? 32 : 24;
+          if (i < 5 && rows.geometry[i]->size() != expected) {
+            throw DatabaseError(std::string("a matrix ") + kGeometryColumns[i] +
+                                " of the wrong size");
+          }
+        }
+        ++column;
+      }
+    } catch (const DatabaseError& error) {
+      throw DatabaseError("COLMAP wrote " + std::string(error.what()) + " for the pair of images " +
+                          std::to_string(pair.id1) + " and " + std::to_string(pair.id2) + ".");
+    }
+    select_matches.Reset();
+    select_geometry.Reset();
+    results.push_back(std::move(rows));
+  }
+  return results;
+}
+
+}  // namespace colmap_graphmatch

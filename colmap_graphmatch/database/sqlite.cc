@@ -1,0 +1,216 @@
+#include "colmap_graphmatch/database/sqlite.h"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/lock_holder.h"
+
+namespace colmap_graphmatch::sqlite {
+namespace {
+
+// A file: URI, in which '?', '#' and '%' of the path would otherwise have a meaning.
+std::string ReadOnlyUri(const std::filesystem::path& path) {
+  static constexpr char kHex[] = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(path).string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte <= ' ' || byte >= 0x7F || c == '%' || c == '?' || c == '#') {
+      uri += {'%', kHex[byte >> 4], kHex[byte & 15]};
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?mode=ro";
+}
+
+std::string Seconds(double seconds) {
+  std::string text = std::to_string(seconds);
+  text.resize(text.find('.') + 2);
+  return text + " s";
+}
+
+}  // namespace
+
+Connection::Connection(const std::filesystem::path& path, Access access,
+                       double lock_timeout_seconds)
+    : path_(path),
+      lockable_path_(path),
+      lock_timeout_seconds_(lock_timeout_seconds),
+      db_(nullptr, &sqlite3_close) {
+  const int mode = access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE;
+  sqlite3* db = nullptr;
+  const int result =
+      sqlite3_open_v2(path.c_str(), &db, mode | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
+  db_.reset(db);
+  if (result != SQLITE_OK) Throw("open the database");
+  // SQLite falls back to reading a file that it may not write, without a word.
+  if (access == Access::kReadWrite && sqlite3_db_readonly(db, "main") == 1) {
+    throw DatabaseError(
+        path.string() +
+        " is read-only. Give yourself the right to write to it, or copy it to a place that "
+        "you can write to.");
+  }
+  sqlite3_extended_result_codes(db, 1);
+  const double milliseconds = std::clamp(1e3 * lock_timeout_seconds, 0.0, 1e9);
+  sqlite3_busy_timeout(db, static_cast<int>(milliseconds));
+}
+
+void Connection::Execute(const std::string& sql) {
+  if (sqlite3_exec(db_.get(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
+    Throw("run \"" + sql.substr(0, 60) + "\"");
+  }
+}
+
+void Connection::AttachReadOnly(const std::filesystem::path& path, const std::string& schema) {
+  Statement attach(*this, "ATTACH ?1 AS " + schema);
+  attach.Bind(1, ReadOnlyUri(path)).Run();
+  lockable_path_ = path;
+}
+
+std::vector<std::string> Connection::Columns(const std::string& table, const std::string& schema) {
+  Statement info(*this, "SELECT name FROM pragma_table_info(?1, ?2) ORDER BY cid");
+  info.Bind(1, table).Bind(2, schema);
+  std::vector<std::string> columns;
+  while (info.Step()) columns.push_back(info.Text(0));
+  return columns;
+}
+
+void Connection::Throw(const std::string& doing) const {
+  const int code = db_ ? sqlite3_extended_errcode(db_.get()) : SQLITE_NOMEM;
+  const std::string detail = db_ ? sqlite3_errmsg(db_.get()) : "out of memory";
+  const std::string what = "Cannot " + doing + " in " + path_.string() + ": ";
+  switch (code & 0xFF) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      throw DatabaseLockedError(what + "another process kept it locked for " +
+                                Seconds(lock_timeout_seconds_) + " (" +
+                                DescribeLockHolders(lockable_path_) +
+                                "). Close that program, or wait longer with "
+                                "--GraphMatching.lock_timeout.");
+    case SQLITE_NOTADB:
+      throw DatabaseError(path_.string() +
+                          " is not a SQLite database. Give the database.db that "
+                          "`colmap feature_extractor` wrote.");
+    case SQLITE_CORRUPT:
+      throw DatabaseError(what + detail +
+                          ". The file is damaged: `sqlite3 FILE .recover` may save its contents.");
+    case SQLITE_FULL:
+      throw DatabaseError(what +
+                          "the disk is full. Nothing half-written was kept; free some space "
+                          "and run the same command again to go on.");
+    case SQLITE_READONLY:
+    case SQLITE_CANTOPEN:
+      throw DatabaseError(what + detail +
+                          ". SQLite needs to write to the file and to its directory: if they or "
+                          "their disk are read-only, copy the database to a place that you can "
+                          "write to.");
+    default:
+      throw DatabaseError(what + detail + ".");
+  }
+}
+
+Statement::Statement(Connection& connection, const std::string& sql)
+    : connection_(&connection), statement_(nullptr, &sqlite3_finalize) {
+  sqlite3_stmt* statement = nullptr;
+  if (sqlite3_prepare_v2(connection.db_.get(), sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
+    connection.Throw("prepare \"" + sql.substr(0, 60) + "\"");
+  }
+  statement_.reset(statement);
+}
+
+Statement& Statement::CheckBind(int result) {
+  if (result != SQLITE_OK) connection_->Throw("bind a value");
+  return *this;
+}
+
+Statement& Statement::Bind(int parameter, std::int64_t value) {
+  return CheckBind(sqlite3_bind_int64(statement_.get(), parameter, value));
+}
+
+Statement& Statement::Bind(int parameter, std::string_view text) {
+  return CheckBind(sqlite3_bind_text64(statement_.get(), parameter, text.data(), text.size(),
+                                       SQLITE_TRANSIENT, SQLITE_UTF8));
+}
+
+Statement& Statement::Bind(int parameter, const Blob& blob) {
+  if (blob.empty()) return BindNull(parameter);
+  return CheckBind(
+      sqlite3_bind_blob64(statement_.get(), parameter, blob.data(), blob.size(), SQLITE_STATIC));
+}
+
+Statement& Statement::BindNull(int parameter) {
+  return CheckBind(sqlite3_bind_null(statement_.get(), parameter));
+}
+
+bool Statement::Step() {
+  switch (sqlite3_step(statement_.get())) {
+    case SQLITE_ROW:
+      return true;
+    case SQLITE_DONE:
+      return false;
+    default:
+      connection_->Throw(sqlite3_stmt_readonly(statement_.get()) != 0 ? "read" : "write");
+  }
+}
+
+void Statement::Reset() {
+  sqlite3_reset(statement_.get());
+  sqlite3_clear_bindings(statement_.get());
+}
+
+void Statement::Run() {
+  Step();
+  Reset();
+}
+
+bool Statement::IsNull(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+}
+
+std::int64_t Statement::Int(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+std::string Statement::Text(int column) const {
+  const unsigned char* text = sqlite3_column_text(statement_.get(), column);
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+  return text == nullptr ? std::string() : std::string(reinterpret_cast<const char*>(text), size);
+}
+
+const std::uint8_t* Statement::Data(int column) const {
+  const void* data = sqlite3_column_blob(statement_.get(), column);
+  if (data == nullptr && Size(column) > 0) connection_->Throw("read a blob");
+  return static_cast<const std::uint8_t*>(data);
+}
+
+std::size_t Statement::Size(int column) const {
+  return static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+}
+
+Blob Statement::CopyBlob(int column) const {
+  const std::uint8_t* data = Data(column);
+  return data == nullptr ? Blob() : Blob(data, data + Size(column));
+}
+
+Transaction::Transaction(Connection& connection) : connection_(&connection) {
+  connection.Execute("BEGIN IMMEDIATE");
+}
+
+Transaction::~Transaction() {
+  if (committed_) return;
+  try {
+    connection_->Execute("ROLLBACK");
+  } catch (const Error&) {
+    // SQLite has rolled back by itself (a full disk, an I/O error): what was to be done is done.
+  }
+}
+
+void Transaction::Commit() {
+  connection_->Execute("COMMIT");
+  committed_ = true;
+}
+
+}  // namespace colmap_graphmatch::sqlite

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+// The little of SQLite that COLMAP databases need, with errors as exceptions: DatabaseLockedError
+// when another process held a lock for longer than the connection waits, DatabaseError otherwise.
+
+namespace colmap_graphmatch::sqlite {
+
+using Blob = std::vector<std::uint8_t>;
+
+enum class Access { kRead, kReadWrite };
+
+class Connection {
+ public:
+  // Opens an existing file; never creates one. lock_timeout_seconds: how long every later call
+  // waits for locks of other processes.
+  Connection(const std::filesystem::path& path, Access access, double lock_timeout_seconds);
+
+  const std::filesystem::path& Path() const { return path_; }
+
+  // Runs statements that return no rows.
+  void Execute(const std::string& sql);
+
+  // Makes the tables of another database file readable (and only that) under the schema name. From
+  // then on it is taken to be the one that other programs may have locked.
+  void AttachReadOnly(const std::filesystem::path& path, const std::string& schema);
+
+  // The columns of a table in their order; empty if there is no such table.
+  std::vector<std::string> Columns(const std::string& table, const std::string& schema = "main");
+
+  [[noreturn]] void Throw(const std::string& doing) const;
+
+ private:
+  friend class Statement;
+
+  std::filesystem::path path_;
+  std::filesystem::path lockable_path_;  // The file that other programs may have locked.
+  double lock_timeout_seconds_;
+  std::unique_ptr<sqlite3, int (*)(sqlite3*)> db_;
+};
+
+// A prepared statement. Parameters are numbered from 1, columns from 0, as in SQLite.
+class Statement {
+ public:
+  Statement(Connection& connection, const std::string& sql);
+
+  Statement& Bind(int parameter, std::int64_t value);
+  Statement& Bind(int parameter, std::string_view text);
+  // The blob is not copied: it must outlive the next Step. An empty blob is bound as NULL, which is
+  // what COLMAP stores for a matrix without rows.
+  Statement& Bind(int parameter, const Blob& blob);
+  Statement& BindNull(int parameter);
+
+  // True if there is a row.
+  bool Step();
+  // Makes the statement ready for new parameters.
+  void Reset();
+  // Step and Reset of a statement that returns no rows.
+  void Run();
+
+  bool IsNull(int column) const;
+  std::int64_t Int(int column) const;
+  std::string Text(int column) const;
+  // The bytes of a blob; valid until the next Step. Throws if SQLite cannot read them.
+  const std::uint8_t* Data(int column) const;
+  std::size_t Size(int column) const;
+  Blob CopyBlob(int column) const;
+
+ private:
+  Statement& CheckBind(int result);
+
+  Connection* connection_;
+  std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement_;
+};
+
+// Rolls back when it goes out of scope, unless Commit was called.
+class Transaction {
+ public:
+  // BEGIN IMMEDIATE: takes the write lock now, so that a competing writer is met here.
+  explicit Transaction(Connection& connection);
+  ~Transaction();
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+
+  void Commit();
+
+ private:
+  Connection* connection_;
+  bool committed_ = false;
+};
+
+}  // namespace colmap_graphmatch::sqlite

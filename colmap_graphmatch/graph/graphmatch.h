@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/options.h"
+#include "colmap_graphmatch/ranking/ranking.h"
+
+namespace colmap_graphmatch {
+
+enum class LoopStage { kSampling, kPropagation };
+
+struct StageStatistics {
+  std::size_t num_tested = 0;  // Pairs that the verifier tested in this run.
+  std::size_t num_edges = 0;   // Those of them that passed.
+  std::size_t num_failed = 0;  // Pairs that the verifier could not test.
+  std::size_t num_known = 0;   // Pairs asked for that earlier runs had tested.
+  std::size_t num_known_edges = 0;
+  double seconds = 0;
+
+  // Edges found / pairs tested, 0 without tests.
+  double Efficiency() const {
+    return num_tested == 0 ? 0 : static_cast<double>(num_edges) / static_cast<double>(num_tested);
+  }
+};
+
+StageStatistics operator+(const StageStatistics& a, const StageStatistics& b);
+
+struct IterationStatistics {
+  StageStatistics sampling;
+  StageStatistics propagation;
+};
+
+// The state of the loop after a pair was verified.
+struct LoopProgress {
+  LoopStage stage = LoopStage::kSampling;
+  int iteration = 0;
+  StageStatistics sampling;
+  StageStatistics propagation;
+  std::size_t num_edges = 0;  // Of the whole graph, those of earlier runs included.
+  std::size_t num_components = 0;
+  std::size_t largest_component = 0;
+  std::size_t num_isolated = 0;
+  // An estimate of the tests to come, from the budgets and the tests that propagation needed so far
+  // for each one by sampling.
+  std::size_t expected_remaining_tests = 0;
+};
+
+struct GraphMatchResult {
+  MatchingGraph graph{0};
+  std::vector<IterationStatistics> iterations;
+  StageStatistics sampling;
+  StageStatistics propagation;
+  // Pairs that were in the database before the run and that the loop did not ask for itself.
+  std::size_t num_seed_pairs = 0;
+  std::size_t num_seed_edges = 0;
+  std::size_t num_components = 0;
+  std::size_t largest_component = 0;
+  std::size_t num_isolated = 0;
+  std::vector<ImagePair> failed_pairs;
+  bool finished = true;  // False if the verifier was asked to stop.
+};
+
+// The sample-and-propagate loop (GraphMatch, section 3; the pseudo-code is in docs/design.md).
+// image_ids gives the image of every vertex of the ranking, ascending.
+// Pairs that the verifier knows already are answered from what it knows, in the same places where
+// an undisturbed run would have tested them: a run that goes on after an interruption follows the
+// path of the first and tests what is missing. If some known pairs are not on this path, because
+// another matcher made them, all known pairs seed the graph before the first test, and count
+// against the sampling budgets of images that rank each other within them.
+//
+// The tested pairs depend on the options, the ranking and the verifier's answers alone. Exceptions
+// of the verifier pass through.
+GraphMatchResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
+                               const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                               ThreadPool& threads,
+                               const std::function<void(const LoopProgress&)>& on_progress);
+
+}  // namespace colmap_graphmatch

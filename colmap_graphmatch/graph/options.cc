@@ -1,0 +1,56 @@
+#include "colmap_graphmatch/graph/options.h"
+
+#include <algorithm>
+#include <string>
+
+#include "colmap_graphmatch/base/errors.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+void CheckAtLeast(const char* name, int value, int minimum) {
+  if (value < minimum) {
+    throw OptionsError(std::string("GraphMatching.") + name + " is " + std::to_string(value) +
+                       "; it must be at least " + std::to_string(minimum) + ".");
+  }
+}
+
+}  // namespace
+
+int GraphMatchOptions::MaxTestsForSampling(std::size_t num_images) const {
+  if (max_tests_for_sampling > 0) return max_tests_for_sampling;
+  return static_cast<int>(std::max(std::min(0.017 * static_cast<double>(num_images), 120.0), 10.0));
+}
+
+int GraphMatchOptions::TestsInIteration(int iteration, std::size_t num_images) const {
+  if (iteration < 0 || iteration >= number_sample_iterations) return 0;
+  const int budget = MaxTestsForSampling(num_images);
+  const int iterations = number_sample_iterations;
+  switch (sampling_schedule) {
+    case SamplingSchedule::kRound:
+      return std::max(1, (budget + iterations / 2) / iterations);
+    case SamplingSchedule::kCarry:
+      return static_cast<int>(static_cast<long>(budget) * (iteration + 1) / iterations -
+                              static_cast<long>(budget) * iteration / iterations);
+    case SamplingSchedule::kFloor:
+      break;
+  }
+  return std::max(1, budget / iterations);
+}
+
+bool GraphMatchOptions::MoreTestsAfterEmpty(int iteration, std::size_t num_images) const {
+  if (TestsInIteration(iteration, num_images) > 0) return false;
+  for (int later = iteration + 1; later < number_sample_iterations; ++later) {
+    if (TestsInIteration(later, num_images) > 0) return true;
+  }
+  return false;
+}
+
+void GraphMatchOptions::Check() const {
+  CheckAtLeast("number_sample_iterations", number_sample_iterations, 0);
+  CheckAtLeast("max_num_neighbors", max_num_neighbors, 1);
+  CheckAtLeast("num_to_propagate", num_to_propagate, 0);
+  CheckAtLeast("max_tests_for_sampling", max_tests_for_sampling, 0);
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/options.h"
+#include "colmap_graphmatch/ranking/ranking.h"
+
+namespace colmap_graphmatch {
+
+// The propagation stage (GraphMatch, section 3.3): along every edge (A, B), and (B, A), if A has
+// fewer than max_num_neighbors neighbours, up to num_to_propagate neighbours C of B that look most
+// like A are proposed as pairs (A, C). first_edge: the edges before this index of graph.Edges() are
+// left out. Returns the pairs ascending, each once.
+std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Ranking& ranking,
+                                  const MatchingGraph& graph, std::size_t first_edge,
+                                  ThreadPool& threads);
+
+}  // namespace colmap_graphmatch

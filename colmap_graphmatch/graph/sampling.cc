@@ -1,0 +1,94 @@
+#include "colmap_graphmatch/graph/sampling.h"
+
+#include <algorithm>
+
+namespace colmap_graphmatch {
+
+Sampler::Sampler(const GraphMatchOptions& options, const Ranking& ranking, ThreadPool& threads)
+    : options_(options),
+      ranking_(ranking),
+      threads_(threads),
+      cursors_(ranking.NumVertices()),
+      num_drawn_(ranking.NumVertices()),
+      drawn_(ranking.NumVertices()) {}
+
+std::vector<Vertex> Sampler::NextUntested(Vertex vertex, std::size_t num,
+                                          const MatchingGraph& graph) {
+  std::vector<Vertex> untested;
+  std::size_t& cursor = cursors_[vertex];
+  bool only_tested_so_far = true;
+  const auto scan = [&](const std::vector<Vertex>& list) {
+    untested.clear();
+    only_tested_so_far = true;
+    for (std::size_t i = cursor; i < list.size() && untested.size() < num; ++i) {
+      if (graph.IsTested(vertex, list[i])) {
+        if (only_tested_so_far) cursor = i + 1;
+        continue;
+      }
+      only_tested_so_far = false;
+      untested.push_back(list[i]);
+    }
+  };
+  const std::vector<Vertex>& nearest = ranking_.NearestOf(vertex);
+  scan(nearest);
+  if (untested.size() < num && nearest.size() + 1 < ranking_.NumVertices()) {
+    scan(ranking_.AllOf(vertex));
+  }
+  return untested;
+}
+
+std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& graph) {
+  const std::size_t num_vertices = ranking_.NumVertices();
+  const int budget = options_.MaxTestsForSampling(num_vertices);
+  const int tests = options_.TestsInIteration(iteration, num_vertices);
+  threads_.ParallelFor(num_vertices, [&](std::size_t i) {
+    const auto vertex = static_cast<Vertex>(i);
+    drawn_[i].clear();
+    const int num = std::min(tests, budget - num_drawn_[i]);
+    if (num <= 0 || graph.Degree(vertex) >= static_cast<std::size_t>(options_.max_num_neighbors)) {
+      return;
+    }
+    drawn_[i] = NextUntested(vertex, static_cast<std::size_t>(num), graph);
+  });
+  std::vector<VertexPair> pairs;
+  for (Vertex vertex = 0; vertex < num_vertices; ++vertex) {
+    for (const Vertex other : drawn_[vertex]) pairs.push_back(MakeVertexPair(vertex, other));
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+void Sampler::ChargeTested(const MatchingGraph& graph) {
+  const auto budget =
+      static_cast<std::size_t>(options_.MaxTestsForSampling(ranking_.NumVertices()));
+  threads_.ParallelFor(ranking_.NumVertices(), [&](std::size_t i) {
+    const auto vertex = static_cast<Vertex>(i);
+    const std::vector<Vertex>& nearest = ranking_.NearestOf(vertex);
+    int num_tested = 0;
+    for (std::size_t k = 0; k < std::min(budget, nearest.size()); ++k) {
+      num_tested += graph.IsTested(vertex, nearest[k]) ? 1 : 0;
+    }
+    num_drawn_[i] = std::max(num_drawn_[i], num_tested);
+  });
+}
+
+void Sampler::Charge() {
+  if (!options_.count_incoming_tests) {
+    for (std::size_t i = 0; i < drawn_.size(); ++i)
+      num_drawn_[i] += static_cast<int>(drawn_[i].size());
+    return;
+  }
+  for (Vertex vertex = 0; vertex < drawn_.size(); ++vertex) {
+    for (const Vertex other : drawn_[vertex]) {
+      // A pair that both of its images drew is one test for each of them.
+      const std::vector<Vertex>& drawn_by_other = drawn_[other];
+      const bool mutual =
+          std::find(drawn_by_other.begin(), drawn_by_other.end(), vertex) != drawn_by_other.end();
+      ++num_drawn_[vertex];
+      if (!mutual) ++num_drawn_[other];
+    }
+  }
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/options.h"
+#include "colmap_graphmatch/ranking/ranking.h"
+
+namespace colmap_graphmatch {
+
+// The sampling stage (GraphMatch, section 3.2): every vertex with fewer than max_num_neighbors
+// neighbours proposes the next untested ones of its ranked list.
+class Sampler {
+ public:
+  Sampler(const GraphMatchOptions& options, const Ranking& ranking, ThreadPool& threads);
+
+  // The pairs to test in an iteration (counted from 0), ascending, each once. Degrees and tested
+  // pairs are those of the graph as it is now. Does not spend any budget.
+  std::vector<VertexPair> Propose(int iteration, const MatchingGraph& graph);
+
+  // Charges the proposed pairs to the budgets of the vertices that drew them. To be called once for
+  // every proposal that is tested, before the next one is made.
+  void Charge();
+
+  // Charges the budget of every vertex with the tested pairs among the first MaxTestsForSampling of
+  // its ranked list: whoever tested them did what sampling would have done.
+  void ChargeTested(const MatchingGraph& graph);
+
+ private:
+  // Moves the cursor of the vertex past tested images and returns up to num untested ones behind
+  // it.
+  std::vector<Vertex> NextUntested(Vertex vertex, std::size_t num, const MatchingGraph& graph);
+
+  GraphMatchOptions options_;
+  const Ranking& ranking_;
+  ThreadPool& threads_;
+  std::vector<std::size_t> cursors_;  // By vertex: all before this place of its list are tested.
+  std::vector<int> num_drawn_;        // By vertex: spent of the budget.
+  std::vector<std::vector<Vertex>> drawn_;  // By vertex: the last proposal.
+};
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "colmap_graphmatch/base/stop_request.h"
+#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/options.h"
+#include "colmap_graphmatch/pipeline/image_vectors.h"
+#include "colmap_graphmatch/ranking/ranking.h"
+#include "colmap_graphmatch/verification/colmap_verifier.h"
+
+namespace colmap_graphmatch {
+
+struct PipelineOptions {
+  std::filesystem::path database_path;
+
+  // A path, or a name to be found on PATH.
+  std::string colmap_path = "colmap";
+
+  // Where the shards are made; empty: $TMPDIR, or /tmp.
+  std::filesystem::path work_path;
+
+  // Cores to use at a time, COLMAP's included; -1: all. Takes the place of
+  // verification.num_threads.
+  int num_threads = -1;
+
+  // Of everything random. The same seed, input and options give the same tested pairs.
+  std::uint64_t seed = 0;
+
+  ImageVectorOptions vectors;
+  RankingOptions ranking;
+  GraphMatchOptions graph;
+  ColmapVerifierOptions verification;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+// What a run tells while it goes on. Called on the thread that called RunPipeline.
+class PipelineObserver {
+ public:
+  virtual ~PipelineObserver() = default;
+  virtual void OnInfo(const std::string& message) = 0;
+  virtual void OnWarning(const std::string& message) = 0;
+  virtual void OnProgress(const LoopProgress& progress) = 0;
+};
+
+struct PipelineResult {
+  std::size_t num_images = 0;
+  std::size_t num_images_without_features = 0;
+  GraphMatchResult matching;
+  double mixture_seconds = 0;
+  double vectors_seconds = 0;
+  double ranking_seconds = 0;
+  double matching_seconds = 0;
+  double total_seconds = 0;
+};
+
+// The whole job: from the features in the database to its two-view geometries. Throws the errors of
+// base/errors.h, StoppedError among them if stop was raised before the first pair; every shard that
+// was verified until then is in the database.
+PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& stop,
+                           PipelineObserver& observer);
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,147 @@
+#include "colmap_graphmatch/pipeline/image_vectors.h"
+
+#include <algorithm>
+#include <future>
+#include <string>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/random.h"
+#include "colmap_graphmatch/encoding/descriptor_selection.h"
+#include "colmap_graphmatch/encoding/fisher_vector.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+static_assert(kDescriptorDim == 128, "encoding/descriptor_selection.h is written for SIFT");
+
+// Images read at a time; twice as many are in memory, with the descriptors that are used.
+constexpr std::size_t kImagesPerChunk = 64;
+
+// The selected descriptors of an image, one after the other.
+struct SelectedDescriptors {
+  std::size_t num = 0;
+  std::vector<std::uint8_t> data;
+
+  SelectedDescriptors(const Descriptors& all, const std::vector<std::size_t>& rows)
+      : num(rows.size()) {
+    data.reserve(num * kDescriptorDim);
+    for (const std::size_t row : rows) {
+      data.insert(data.end(), all.Row(row), all.Row(row) + kDescriptorDim);
+    }
+  }
+};
+
+Random ImageRandom(const ImageVectorOptions& options, RandomStage stage, ImageId image_id) {
+  return Random({options.seed, static_cast<std::uint64_t>(stage), image_id});
+}
+
+// The descriptors of an image, as many as there were when the images were listed.
+Descriptors ReadChecked(Database& database, const ImageRecord& image) {
+  Descriptors descriptors = database.ReadDescriptors(image.id);
+  if (descriptors.num_rows != image.num_features) {
+    throw DatabaseError("The features of image \"" + image.name + "\" (id " +
+                        std::to_string(image.id) + ") in " + database.Path().string() +
+                        " changed while they were read. Let the other program finish first.");
+  }
+  return descriptors;
+}
+
+// Calls body(i, what select(image i) returned) for every image, in parallel, while the next images
+// are read.
+template <typename Select, typename Body>
+void ForEachImage(const std::vector<ImageRecord>& images, ThreadPool& threads,
+                  const StopRequest& stop, const Select& select, const Body& body) {
+  const auto read_chunk = [&](std::size_t first) {
+    std::vector<SelectedDescriptors> chunk;
+    for (std::size_t i = first; i < std::min(first + kImagesPerChunk, images.size()); ++i) {
+      chunk.push_back(select(images[i]));
+    }
+    return chunk;
+  };
+  std::vector<SelectedDescriptors> chunk = read_chunk(0);
+  for (std::size_t first = 0; first < images.size(); first += kImagesPerChunk) {
+    stop.ThrowIfRequested();
+    std::future<std::vector<SelectedDescriptors>> next =
+        std::async(std::launch::async, read_chunk, first + kImagesPerChunk);
+    threads.ParallelFor(chunk.size(), [&](std::size_t i) { body(first + i, chunk[i]); });
+    chunk = next.get();
+  }
+}
+
+}  // namespace
+
+void ImageVectorOptions::Check() const {
+  gmm.Check();
+  if (num_training_descriptors < 1) {
+    throw OptionsError("num_training_descriptors is " + std::to_string(num_training_descriptors) +
+                       "; the mixture needs at least 1.");
+  }
+  if (max_num_features < 1) {
+    throw OptionsError("max_num_features is " + std::to_string(max_num_features) +
+                       "; an image vector needs at least 1.");
+  }
+}
+
+GmmTraining LearnMixture(const ImageVectorOptions& options, Database& database,
+                         const std::vector<ImageRecord>& images, ThreadPool& threads,
+                         const StopRequest& stop) {
+  const std::size_t per_image =
+      (static_cast<std::size_t>(options.num_training_descriptors) + images.size() - 1) /
+      images.size();
+  std::vector<Eigen::Index> first_rows = {0};
+  for (const ImageRecord& image : images) {
+    first_rows.push_back(first_rows.back() +
+                         static_cast<Eigen::Index>(std::min(image.num_features, per_image)));
+  }
+  RowMatrixXf samples(first_rows.back(), kDescriptorDim);
+  ForEachImage(
+      images, threads, stop,
+      [&](const ImageRecord& image) {
+        const Descriptors descriptors = ReadChecked(database, image);
+        return SelectedDescriptors(
+            descriptors,
+            SelectRandom(descriptors.num_rows, per_image,
+                         ImageRandom(options, RandomStage::kTrainingSample, image.id)));
+      },
+      [&](std::size_t i, const SelectedDescriptors& selected) {
+        samples.middleRows(first_rows[i], first_rows[i + 1] - first_rows[i]) =
+            DescriptorsToFloat(selected.data.data(), selected.num);
+      });
+  return TrainGmm(options.gmm, samples, threads, &stop);
+}
+
+std::vector<float> EncodeImages(const ImageVectorOptions& options, const GaussianMixture& mixture,
+                                Database& database, const std::vector<ImageRecord>& images,
+                                ThreadPool& threads, const StopRequest& stop) {
+  const FisherVectorEncoder encoder(mixture);
+  const auto dim = static_cast<std::size_t>(encoder.Dim());
+  const auto max_num_features = static_cast<std::size_t>(options.max_num_features);
+  std::vector<float> vectors(images.size() * dim);
+  ForEachImage(
+      images, threads, stop,
+      [&](const ImageRecord& image) {
+        const Descriptors descriptors = ReadChecked(database, image);
+        if (options.feature_selection == ImageVectorOptions::FeatureSelection::kRandom) {
+          return SelectedDescriptors(
+              descriptors,
+              SelectRandom(descriptors.num_rows, max_num_features,
+                           ImageRandom(options, RandomStage::kFeatureSelection, image.id)));
+        }
+        const Keypoints keypoints = database.ReadKeypoints(image.id);
+        std::vector<float> scales(descriptors.num_rows);
+        for (std::size_t row = 0; row < std::min(scales.size(), keypoints.num_rows); ++row) {
+          scales[row] = keypoints.Scale(row);
+        }
+        return SelectedDescriptors(descriptors, SelectLargestScales(scales, max_num_features));
+      },
+      [&](std::size_t i, const SelectedDescriptors& selected) {
+        const Eigen::VectorXf vector =
+            encoder.Encode(DescriptorsToFloat(selected.data.data(), selected.num));
+        std::copy(vector.begin(), vector.end(),
+                  vectors.begin() + static_cast<std::ptrdiff_t>(i * dim));
+      });
+  return vectors;
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,78 @@
+#include "colmap_graphmatch/ranking/ranking.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+#include <utility>
+
+#include "colmap_graphmatch/ranking/dot_products.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// Vertices whose products with all others are computed at a time: the buffer is kBlockRows x N
+// floats a thread.
+constexpr std::size_t kBlockRows = 48;
+
+// The num_nearest others of `vertex`, given its products with all.
+std::vector<Vertex> Nearest(const float* products, std::size_t num_vertices, Vertex vertex,
+                            std::size_t num_nearest) {
+  std::vector<Vertex> order(num_vertices);
+  std::iota(order.begin(), order.end(), Vertex{0});
+  order.erase(order.begin() + static_cast<std::ptrdiff_t>(vertex));
+  const auto nearer = [products](Vertex a, Vertex b) {
+    return products[a] != products[b] ? products[a] > products[b] : a < b;
+  };
+  if (num_nearest < order.size()) {
+    const auto end = order.begin() + static_cast<std::ptrdiff_t>(num_nearest);
+    std::nth_element(order.begin(), end, order.end(), nearer);
+    order.erase(end, order.end());
+  }
+  std::sort(order.begin(), order.end(), nearer);
+  order.shrink_to_fit();
+  return order;
+}
+
+}  // namespace
+
+Ranking::Ranking(const RankingOptions& options, std::size_t num_vertices, std::size_t dim,
+                 std::vector<float> vectors, ThreadPool& threads, const StopRequest* stop)
+    : num_vertices_(num_vertices),
+      padded_dim_((dim + kRowPadding - 1) / kRowPadding * kRowPadding),
+      lists_(num_vertices) {
+  if (padded_dim_ == dim) {
+    vectors_ = std::move(vectors);
+  } else {
+    vectors_.resize(num_vertices * padded_dim_);
+    for (std::size_t i = 0; i < num_vertices; ++i) {
+      std::copy_n(vectors.data() + i * dim, dim, vectors_.data() + i * padded_dim_);
+    }
+  }
+  const std::size_t num_blocks = (num_vertices + kBlockRows - 1) / kBlockRows;
+  threads.ParallelFor(num_blocks, [&](std::size_t block) {
+    if (stop != nullptr) stop->ThrowIfRequested();
+    const std::size_t first = block * kBlockRows;
+    const std::size_t num_rows = std::min(kBlockRows, num_vertices_ - first);
+    std::vector<float> products(num_rows * num_vertices_);
+    DotProducts(Row(first), num_rows, Row(0), num_vertices_, padded_dim_, products.data(),
+                num_vertices_);
+    for (std::size_t i = 0; i < num_rows; ++i) {
+      lists_[first + i] = Nearest(products.data() + i * num_vertices_, num_vertices_,
+                                  static_cast<Vertex>(first + i), options.list_length);
+    }
+  });
+}
+
+float Ranking::Distance(Vertex a, Vertex b) const {
+  float product = 0;
+  DotProducts(Row(a), 1, Row(b), 1, padded_dim_, &product, 1);
+  return 2 - 2 * product;
+}
+
+std::vector<Vertex> Ranking::AllOf(Vertex vertex) const {
+  std::vector<float> products(num_vertices_);
+  DotProducts(Row(vertex), 1, Row(0), num_vertices_, padded_dim_, products.data(), num_vertices_);
+  return Nearest(products.data(), num_vertices_, vertex, num_vertices_);
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "colmap_graphmatch/base/stop_request.h"
+#include "colmap_graphmatch/base/thread_pool.h"
+
+namespace colmap_graphmatch {
+
+// The number of an image among those that have a vector: 0 .. N - 1. The matching graph counts
+// images the same way.
+using Vertex = std::uint32_t;
+
+struct RankingOptions {
+  // The length of the ranked list that is kept for every image; what the loop needs beyond it is
+  // computed again. Memory: 4 N list_length bytes.
+  std::size_t list_length = 512;
+};
+
+// For every image the others by ascending distance d = |x - y|^2 = 2 - 2 x.y of their unit-length
+// vectors (GraphMatch, section 3.1), ties by ascending number. Computed by blocked matrix products,
+// never as an N x N matrix. Results are bitwise the same for any number of threads, and lists agree
+// with distances computed one by one. Const members are thread-safe.
+class Ranking {
+ public:
+  // vectors: N rows of dim floats of unit length, row-major. Throws StoppedError if stop (may be
+  // null) asks for it.
+  Ranking(const RankingOptions& options, std::size_t num_vertices, std::size_t dim,
+          std::vector<float> vectors, ThreadPool& threads, const StopRequest* stop = nullptr);
+
+  std::size_t NumVertices() const { return num_vertices_; }
+
+  // In [0, 4], up to rounding.
+  float Distance(Vertex a, Vertex b) const;
+
+  // The nearest others, at most list_length of them, nearest first.
+  const std::vector<Vertex>& NearestOf(Vertex vertex) const { return lists_[vertex]; }
+
+  // All others, nearest first; NearestOf(vertex) is its beginning. Computed on every call: O(N
+  // dim).
+  std::vector<Vertex> AllOf(Vertex vertex) const;
+
+ private:
+  const float* Row(std::size_t row) const { return vectors_.data() + row * padded_dim_; }
+
+  std::size_t num_vertices_;
+  std::size_t padded_dim_;
+  std::vector<float> vectors_;  // N x padded_dim_, padded with zeros.
+  std::vector<std::vector<Vertex>> lists_;
+};
+
+}  // namespace colmap_graphmatch

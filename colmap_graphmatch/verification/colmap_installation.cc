@@ -1,0 +1,126 @@
+#include "colmap_graphmatch/verification/colmap_installation.h"
+
+#include <boost/process/search_path.hpp>
+#include <deque>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/verification/subprocess.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+constexpr std::pair<int, int> kOldestVersion(3, 8);
+
+// A COLMAP that does not even print its help within this time hangs.
+constexpr double kHelpTimeoutSeconds = 60;
+
+std::filesystem::path FindExecutable(const std::string& colmap_path) {
+  const bool is_name = colmap_path.find('/') == std::string::npos;
+  std::filesystem::path found = is_name ? boost::process::search_path(colmap_path).string()
+                                        : std::filesystem::absolute(colmap_path).string();
+  std::error_code error;
+  if (found.empty() || !std::filesystem::exists(found, error)) {
+    throw ColmapError((is_name ? "There is no program \"" + colmap_path + "\" on the PATH"
+                               : "There is no program at " + colmap_path) +
+                      ". Install COLMAP (Debian: apt-get install colmap) or say where it is with "
+                      "--colmap_path.");
+  }
+  return found;
+}
+
+std::string Output(const std::vector<std::string>& command, const std::filesystem::path& path,
+                   const StopRequest& stop) {
+  const SubprocessResult result =
+      RunSubprocess(command, path, kHelpTimeoutSeconds, [&stop] { return stop.Requested(); });
+  stop.ThrowIfRequested();
+  if (!result.Succeeded()) {
+    throw ColmapError(command[0] + " " + command[1] + " " + result.Describe() + ":\n" +
+                      LastLines(path, 5) +
+                      "\nThis program does not work as a COLMAP; name another with --colmap_path.");
+  }
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+std::string ColmapInstallation::Version() const {
+  return std::to_string(major) + "." + std::to_string(minor) +
+         (patch > 0 ? "." + std::to_string(patch) : "");
+}
+
+std::string ColmapInstallation::Spelling(const std::string& option) const {
+  for (const char* group : {"SiftMatching.", "TwoViewGeometry.", "FeatureMatching."}) {
+    if (matcher_options.count(group + option) > 0) return group + option;
+  }
+  return "";
+}
+
+std::vector<std::string> ColmapInstallation::Arguments(
+    const std::map<std::string, std::string>& options, std::vector<std::string>* unknown) const {
+  std::vector<std::string> arguments;
+  for (const auto& [name, value] : options) {
+    const std::string spelling = Spelling(name);
+    if (spelling.empty()) {
+      unknown->push_back(name);
+    } else {
+      arguments.push_back("--" + spelling);
+      arguments.push_back(value);
+    }
+  }
+  return arguments;
+}
+
+ColmapInstallation DetectColmap(const std::string& colmap_path,
+                                const std::filesystem::path& work_path, const StopRequest& stop) {
+  ColmapInstallation colmap;
+  colmap.executable = FindExecutable(colmap_path);
+  const std::string executable = colmap.executable.string();
+  const std::string help = Output({executable, "help"}, work_path / "help.txt", stop);
+
+  static const std::regex kVersion(R"(COLMAP (\d+)\.(\d+)(?:\.(\d+))?)");
+  std::smatch version;
+  if (!std::regex_search(help, version, kVersion)) {
+    throw ColmapError(executable +
+                      " is not COLMAP: its help does not say a version. Name the program with "
+                      "--colmap_path.");
+  }
+  colmap.major = std::stoi(version[1]);
+  colmap.minor = std::stoi(version[2]);
+  colmap.patch = version[3].matched ? std::stoi(version[3]) : 0;
+  if (std::make_pair(colmap.major, colmap.minor) < kOldestVersion) {
+    throw ColmapError(executable + " is COLMAP " + colmap.Version() +
+                      "; this program needs 3.8 or later. Name another one with --colmap_path.");
+  }
+  // "with CUDA", "without CUDA"; 4.x: "with GPU support (CUDA ...)", "without GPU support".
+  static const std::regex kGpu(R"(\bwith (CUDA|GPU))");
+  colmap.has_gpu = std::regex_search(help, kGpu);
+
+  const std::string options =
+      Output({executable, "matches_importer", "-h"}, work_path / "options.txt", stop);
+  static const std::regex kOption(R"(--([A-Za-z]+\.[A-Za-z0-9_]+))");
+  for (std::sregex_iterator match(options.begin(), options.end(), kOption), end; match != end;
+       ++match) {
+    colmap.matcher_options.insert((*match)[1]);
+  }
+  return colmap;
+}
+
+std::string LastLines(const std::filesystem::path& output_path, std::size_t num_lines) {
+  std::ifstream file(output_path);
+  std::deque<std::string> lines;
+  for (std::string line; std::getline(file, line);) {
+    if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    lines.push_back(line);
+    if (lines.size() > num_lines) lines.pop_front();
+  }
+  std::string text;
+  for (const std::string& line : lines) text += (text.empty() ? "" : "\n") + line;
+  return text;
+}
+
+}  // namespace colmap_graphmatch

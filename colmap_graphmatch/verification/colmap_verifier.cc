@@ -1,0 +1,350 @@
+#include "colmap_graphmatch/verification/colmap_verifier.h"
+
+#include <algorithm>
+#include <atomic>
+#include <boost/asio/post.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <fstream>
+#include <mutex>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/database/shard.h"
+#include "colmap_graphmatch/verification/subprocess.h"
+#include "colmap_graphmatch/verification/work_directory.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// A batch is cut into about this many shards, so that up to as many processes have something to do.
+// Fixed: what a shard contains must not depend on the number of cores.
+constexpr std::size_t kShardsPerBatch = 64;
+
+// Below this the start of COLMAP and the copy of the features would cost more than a few per cent.
+constexpr std::size_t kMinPairsPerShard = 8;
+
+// Runs of COLMAP on the same pairs before they are split or given up: a second try gets past what
+// was not their fault (memory, a signal).
+constexpr int kTries = 2;
+
+// Pairs in a row, no two of them with an image in common and no other pair verified between them,
+// on which COLMAP has to fail to be given up. One bad image fails in many pairs, and they come
+// together.
+constexpr std::size_t kMaxUnrelatedFailures = 4;
+
+// How much slower than the slowest shard so far a shard may be, and the seconds that any may take.
+constexpr double kPatience = 20;
+constexpr double kMinTimeoutSeconds = 30;
+
+// Less free space than this in the working directory explains any failure of COLMAP.
+constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
+
+std::vector<std::vector<ImagePair>> CutIntoShards(const std::vector<ImagePair>& pairs,
+                                                  std::size_t max_pairs_per_shard) {
+  const std::size_t wanted = (pairs.size() + kShardsPerBatch - 1) / kShardsPerBatch;
+  const std::size_t size = std::min(std::max(wanted, kMinPairsPerShard), max_pairs_per_shard);
+  std::vector<std::vector<ImagePair>> shards;
+  for (std::size_t first = 0; first < pairs.size(); first += size) {
+    const auto begin = pairs.begin() + static_cast<std::ptrdiff_t>(first);
+    shards.emplace_back(begin,
+                        begin + static_cast<std::ptrdiff_t>(std::min(size, pairs.size() - first)));
+  }
+  return shards;
+}
+
+}  // namespace
+
+void ColmapVerifierOptions::Check() const {
+  EffectiveNumThreads(num_threads);
+  if (num_processes < 0) {
+    throw OptionsError("The number of COLMAP processes must be positive, or 0 to have it chosen.");
+  }
+  if (min_num_inliers < 1) throw OptionsError("min_num_inliers must be at least 1.");
+  if (max_pairs_per_shard < 1) throw OptionsError("A shard needs at least one pair.");
+  if (!(timeout_per_pair > 0)) throw OptionsError("The timeout of a pair must be positive.");
+  if (!(lock_timeout >= 0)) throw OptionsError("The lock timeout must not be negative.");
+}
+
+// What the calling thread and the workers share while a batch is verified.
+struct ColmapVerifier::Batch {
+  struct Part {
+    std::vector<PairRows> results;
+    std::vector<Failure> failures;
+  };
+
+  std::mutex mutex;
+  std::condition_variable changed;            // finished, num_workers or abort.
+  std::deque<std::vector<ImagePair>> shards;  // Not yet taken.
+  std::deque<Part> finished;                  // Not yet merged.
+  int num_workers = 0;
+  std::exception_ptr exception;
+  std::atomic<bool> abort{false};
+
+  void Push(Part part) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    finished.push_back(std::move(part));
+    changed.notify_all();
+  }
+};
+
+ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
+                               const ColmapInstallation& colmap, Database& database,
+                               const std::vector<ImageRecord>& images,
+                               const std::filesystem::path& work_path, const StopRequest& stop,
+                               const std::function<void(const std::string&)>& on_warning)
+    : options_(options),
+      colmap_(colmap),
+      database_(database),
+      work_path_(work_path),
+      template_path_(work_path / "template.db"),
+      stop_(stop),
+      on_warning_(on_warning) {
+  options_.Check();
+  options_.use_gpu = options.use_gpu && colmap.has_gpu;
+  for (const ImageRecord& image : images) images_.emplace(image.id, image);
+  for (const TestedPair& tested : database.ReadTestedPairs()) {
+    const auto min_num_inliers = static_cast<std::size_t>(options.min_num_inliers);
+    const bool is_edge = IsEdge(tested.num_inliers, tested.config, min_num_inliers);
+    known_.push_back({tested.pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
+                      static_cast<std::uint32_t>(tested.num_inliers)});
+  }
+
+  const int num_threads = EffectiveNumThreads(options.num_threads);
+  num_processes_ = options.num_processes > 0 ? options.num_processes
+                   : options_.use_gpu        ? 1
+                                             : num_threads;
+  threads_per_process_ = std::max(1, num_threads / num_processes_);
+
+  std::map<std::string, std::string> colmap_options = options.colmap_options;
+  colmap_options["use_gpu"] = options_.use_gpu ? "1" : "0";
+  colmap_options["num_threads"] = std::to_string(threads_per_process_);
+  colmap_options["min_num_inliers"] = std::to_string(options.min_num_inliers);
+  std::vector<std::string> unknown;
+  arguments_ = colmap.Arguments(colmap_options, &unknown);
+  for (const std::string& name : unknown) {
+    on_warning_("COLMAP " + colmap.Version() + " has no option " + name + "; it has no effect.");
+  }
+
+  const std::filesystem::path output_path = work_path / "database_creator.txt";
+  const SubprocessResult result = RunSubprocess(
+      {colmap.executable.string(), "database_creator", "--database_path", template_path_.string()},
+      output_path, kMinTimeoutSeconds, [&stop] { return stop.Requested(); });
+  stop.ThrowIfRequested();
+  if (!result.Succeeded() || !std::filesystem::exists(template_path_)) {
+    throw ColmapError("`" + colmap.executable.string() + " database_creator` " + result.Describe() +
+                      " and made no database in " + work_path.string() + ":\n" +
+                      LastLines(output_path, 5));
+  }
+}
+
+void ColmapVerifier::ThrowIfDiskIsFull() const {
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(work_path_, error);
+  if (error || space.available >= kMinFreeBytes) return;
+  throw FileError("The disk of the working directory " + work_path_.string() +
+                  " is full. Free some space or name another directory with "
+                  "--GraphMatching.work_path; run the same command again to go on.");
+}
+
+void ColmapVerifier::CheckThatColmapWorks(const std::vector<PairRows>& results,
+                                          const std::vector<Failure>& failures) {
+  if (!results.empty()) {
+    failing_images_.clear();
+    return;
+  }
+  for (const auto& [pair, problem] : failures) {
+    if (failing_images_.count(pair.id1) + failing_images_.count(pair.id2) > 0) continue;
+    failing_images_.insert({pair.id1, pair.id2});
+    if (failing_images_.size() < 2 * kMaxUnrelatedFailures) continue;
+    throw ColmapError("COLMAP fails on every pair of images. The last time it " + problem +
+                      (options_.use_gpu ? "\nThis COLMAP was built to use a GPU; on a machine "
+                                          "without one add --SiftMatching.use_gpu 0."
+                                        : "") +
+                      "\nWhat was verified before is kept.");
+  }
+}
+
+std::string ColmapVerifier::TryShard(const std::vector<ImagePair>& pairs, Batch* batch,
+                                     std::vector<PairRows>* results) {
+  double timeout = options_.timeout_per_pair * static_cast<double>(pairs.size() + 1);
+  {
+    const std::lock_guard<std::mutex> lock(batch->mutex);
+    if (slowest_seconds_per_pair_ > 0) {
+      timeout = std::min(timeout, kMinTimeoutSeconds + kPatience * slowest_seconds_per_pair_ *
+                                                           static_cast<double>(pairs.size()));
+    }
+  }
+  const WorkDirectory shard(work_path_);
+  const std::filesystem::path database_path = shard.Path() / "database.db";
+  const std::filesystem::path list_path = shard.Path() / "pairs.txt";
+  const std::filesystem::path output_path = shard.Path() / "output.txt";
+  try {
+    std::filesystem::copy_file(template_path_, database_path);
+    FillShard(database_path, database_.Path(), options_.lock_timeout, pairs);
+  } catch (const std::filesystem::filesystem_error& error) {
+    throw FileError("Cannot make a shard in the working directory: " + std::string(error.what()) +
+                    ". Name another directory with --GraphMatching.work_path.");
+  } catch (const DatabaseError&) {
+    ThrowIfDiskIsFull();
+    throw;
+  }
+  std::ofstream list(list_path);
+  for (const ImagePair& pair : pairs) {
+    list << ShardImageName(pair.id1) << ' ' << ShardImageName(pair.id2) << '\n';
+  }
+  list.close();
+  if (!list) throw FileError("Cannot write " + list_path.string() + ". Is the disk full?");
+
+  std::vector<std::string> command = {
+      colmap_.executable.string(), "matches_importer", "--database_path", database_path.string(),
+      "--match_list_path",         list_path.string(), "--match_type",    "pairs"};
+  command.insert(command.end(), arguments_.begin(), arguments_.end());
+  const SubprocessResult run = RunSubprocess(
+      command, output_path, timeout, [&] { return stop_.Abandon() || batch->abort.load(); });
+  if (run.ending == SubprocessResult::Ending::kStopped) return run.Describe();
+
+  std::string problem;
+  if (!run.Succeeded()) {
+    problem = run.Describe() + ":\n" + LastLines(output_path, 8);
+  } else {
+    try {
+      std::map<ImageId, std::size_t> num_features;
+      for (const ImagePair& pair : pairs) {
+        num_features[pair.id1] = images_.at(pair.id1).num_features;
+        num_features[pair.id2] = images_.at(pair.id2).num_features;
+      }
+      *results = ReadShard(database_path, pairs, num_features);
+    } catch (const DatabaseError& error) {
+      problem = std::string("ended without an error, but: ") + error.what() + "\n" +
+                LastLines(output_path, 8);
+    }
+  }
+  if (!problem.empty()) {
+    ThrowIfDiskIsFull();
+    return problem;
+  }
+  const std::lock_guard<std::mutex> lock(batch->mutex);
+  slowest_seconds_per_pair_ =
+      std::max(slowest_seconds_per_pair_, run.seconds / static_cast<double>(pairs.size()));
+  return "";
+}
+
+void ColmapVerifier::ProcessShard(const std::vector<ImagePair>& pairs, Batch* batch) {
+  Batch::Part part;
+  std::string problem;
+  for (int i = 0; i < kTries; ++i) {
+    if (stop_.Abandon() || batch->abort) return;
+    problem = TryShard(pairs, batch, &part.results);
+    if (problem.empty()) {
+      batch->Push(std::move(part));
+      return;
+    }
+  }
+  if (stop_.Abandon() || batch->abort) return;
+  if (pairs.size() == 1) {
+    part.failures.emplace_back(pairs.front(), problem);
+    batch->Push(std::move(part));
+    return;
+  }
+  const auto middle = pairs.begin() + static_cast<std::ptrdiff_t>(pairs.size() / 2);
+  ProcessShard({pairs.begin(), middle}, batch);
+  ProcessShard({middle, pairs.end()}, batch);
+}
+
+void ColmapVerifier::Work(Batch* batch) {
+  try {
+    while (true) {
+      std::vector<ImagePair> shard;
+      {
+        std::unique_lock<std::mutex> lock(batch->mutex);
+        // What is not in the database yet is lost if we are killed: it must not pile up.
+        batch->changed.wait(lock, [&] {
+          return batch->abort || batch->finished.size() <= static_cast<std::size_t>(num_processes_);
+        });
+        if (batch->shards.empty() || batch->abort || stop_.Requested()) break;
+        shard = std::move(batch->shards.front());
+        batch->shards.pop_front();
+      }
+      ProcessShard(shard, batch);
+    }
+  } catch (...) {
+    const std::lock_guard<std::mutex> lock(batch->mutex);
+    if (!batch->exception) batch->exception = std::current_exception();
+    batch->abort = true;
+  }
+  const std::lock_guard<std::mutex> lock(batch->mutex);
+  --batch->num_workers;
+  batch->changed.notify_all();
+}
+
+bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
+                            const std::function<void(const VerifiedPair&)>& on_verified) {
+  Batch batch;
+  // Shards are cut before known pairs are taken out: a run that goes on after an interruption then
+  // gives COLMAP the same shards, and gets the same answers, as one that was never interrupted.
+  std::size_t num_unanswered = 0;
+  for (std::vector<ImagePair>& shard :
+       CutIntoShards(pairs, static_cast<std::size_t>(options_.max_pairs_per_shard))) {
+    const auto unknown_end = std::stable_partition(
+        shard.begin(), shard.end(),
+        [this](const ImagePair& pair) { return FindPair(known_, pair) == nullptr; });
+    for (auto pair = unknown_end; pair != shard.end(); ++pair)
+      on_verified(*FindPair(known_, *pair));
+    shard.erase(unknown_end, shard.end());
+    num_unanswered += shard.size();
+    if (!shard.empty()) batch.shards.push_back(std::move(shard));
+  }
+  if (num_unanswered == 0) return true;
+
+  batch.num_workers =
+      static_cast<int>(std::min(batch.shards.size(), static_cast<std::size_t>(num_processes_)));
+  boost::asio::thread_pool workers(static_cast<std::size_t>(batch.num_workers));
+  for (int i = batch.num_workers; i > 0; --i) {
+    boost::asio::post(workers, [this, &batch] { Work(&batch); });
+  }
+
+  try {
+    std::unique_lock<std::mutex> lock(batch.mutex);
+    while (true) {
+      batch.changed.wait(lock, [&] { return !batch.finished.empty() || batch.num_workers == 0; });
+      if (batch.finished.empty()) break;
+      const Batch::Part part = std::move(batch.finished.front());
+      batch.finished.pop_front();
+      batch.changed.notify_all();
+      lock.unlock();
+      CheckThatColmapWorks(part.results, part.failures);
+      if (!part.results.empty()) database_.WritePairs(part.results);
+      for (const PairRows& rows : part.results) {
+        const bool is_edge = IsEdge(rows.num_inliers, rows.config,
+                                    static_cast<std::size_t>(options_.min_num_inliers));
+        --num_unanswered;
+        on_verified({rows.pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
+                     static_cast<std::uint32_t>(rows.num_inliers)});
+      }
+      for (const auto& [pair, problem] : part.failures) {
+        on_warning_("COLMAP failed on the pair \"" + ImageName(pair.id1) + "\" and \"" +
+                    ImageName(pair.id2) + "\", which stays untested. It " + problem);
+        --num_unanswered;
+        on_verified({pair, PairOutcome::kFailed, 0});
+      }
+      lock.lock();
+    }
+  } catch (...) {
+    {
+      const std::lock_guard<std::mutex> lock(batch.mutex);
+      batch.abort = true;
+      batch.changed.notify_all();
+    }
+    workers.join();
+    throw;
+  }
+  workers.join();
+  if (batch.exception) std::rethrow_exception(batch.exception);
+  return num_unanswered == 0;
+}
+
+}  // namespace colmap_graphmatch

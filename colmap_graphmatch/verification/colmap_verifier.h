@@ -1,0 +1,114 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/stop_request.h"
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/verification/colmap_installation.h"
+
+namespace colmap_graphmatch {
+
+struct ColmapVerifierOptions {
+  // The cores that all COLMAP processes together may use; -1: all.
+  int num_threads = -1;
+
+  // COLMAP processes at a time; each gets num_threads / num_processes threads. 0: num_threads
+  // processes of one thread without a GPU, and one process with it (docs/design.md).
+  int num_processes = 0;
+
+  // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
+  bool use_gpu = true;
+
+  // A pair is an edge with this many inliers. Also handed to COLMAP.
+  int min_num_inliers = 15;
+
+  // Other options of COLMAP's feature matching and geometric verification, by their names without a
+  // group (e.g. "max_ratio"), as COLMAP is to get them. What is not here keeps COLMAP's own
+  // default.
+  std::map<std::string, std::string> colmap_options;
+
+  // Pairs a shard at most, the amount of work that a crash of COLMAP or kill -9 can lose.
+  int max_pairs_per_shard = 64;
+
+  // Seconds that COLMAP may take for a pair before it counts as hanging. Once shards have come
+  // back, one that takes more than 20 times as long a pair as the slowest of them counts as
+  // hanging, too.
+  double timeout_per_pair = 60;
+
+  // Seconds to wait for locks of other processes on the user's database.
+  double lock_timeout = 60;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+// Has COLMAP match and verify the pairs, in shards (see docs/design.md), and writes every finished
+// shard to the user's database in one transaction.
+//
+// A shard on which COLMAP crashes, hangs or writes nonsense is tried again, then halved until the
+// pair that is to blame is alone; that one is reported as kFailed and through on_warning, and stays
+// untested in the database. If COLMAP fails on several pairs in a row that have no image in common,
+// Verify throws ColmapError with COLMAP's last words.
+class ColmapVerifier : public PairVerifier {
+ public:
+  // images: those of the database. work_path: an existing directory for the shards. stop and
+  // database must outlive the verifier. on_warning is called on the thread that calls the
+  // constructor or Verify. Throws ColmapError if COLMAP cannot make an empty database.
+  ColmapVerifier(const ColmapVerifierOptions& options, const ColmapInstallation& colmap,
+                 Database& database, const std::vector<ImageRecord>& images,
+                 const std::filesystem::path& work_path, const StopRequest& stop,
+                 const std::function<void(const std::string&)>& on_warning);
+
+  // The number of COLMAP processes at a time, and of threads in each.
+  int NumProcesses() const { return num_processes_; }
+  int NumThreadsPerProcess() const { return threads_per_process_; }
+  bool UsesGpu() const { return options_.use_gpu; }
+
+  const std::vector<VerifiedPair>& KnownPairs() const override { return known_; }
+  bool Verify(const std::vector<ImagePair>& pairs,
+              const std::function<void(const VerifiedPair&)>& on_verified) override;
+
+ private:
+  struct Batch;
+  using Failure = std::pair<ImagePair, std::string>;  // And what COLMAP said.
+
+  std::string ImageName(ImageId image_id) const { return images_.at(image_id).name; }
+  // What a worker thread does: takes shards until none is left.
+  void Work(Batch* batch);
+  void ProcessShard(const std::vector<ImagePair>& pairs, Batch* batch);
+  // One run of COLMAP on the pairs. An empty string if it went well; otherwise what went wrong.
+  std::string TryShard(const std::vector<ImagePair>& pairs, Batch* batch,
+                       std::vector<PairRows>* results);
+  void ThrowIfDiskIsFull() const;
+  // Throws ColmapError once COLMAP has failed on pairs that have nothing in common.
+  void CheckThatColmapWorks(const std::vector<PairRows>& results,
+                            const std::vector<Failure>& failures);
+
+  ColmapVerifierOptions options_;
+  ColmapInstallation colmap_;
+  Database& database_;
+  std::map<ImageId, ImageRecord> images_;
+  std::filesystem::path work_path_;
+  std::filesystem::path template_path_;  // An empty database, made by the installed COLMAP.
+  const StopRequest& stop_;
+  std::function<void(const std::string&)> on_warning_;
+  int num_processes_ = 1;
+  int threads_per_process_ = 1;
+  std::vector<std::string> arguments_;  // Of every run of matches_importer.
+  std::vector<VerifiedPair> known_;     // Ascending.
+  double slowest_seconds_per_pair_ =
+      0;  // 0 until a shard came back. Guarded by the mutex of the batch.
+  std::set<ImageId>
+      failing_images_;  // Of failures since the last success, no image in two of them.
+};
+
+}  // namespace colmap_graphmatch

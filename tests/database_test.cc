@@ -1,0 +1,500 @@
+#include "colmap_graphmatch/database/database.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/shard.h"
+#include "tests/support/synthetic_database.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+constexpr double kLockTimeout = 0.2;
+
+// The message of the error that a call throws, empty if it throws none.
+template <typename ErrorType = DatabaseError, typename Function>
+std::string MessageOf(const Function& function) {
+  try {
+    function();
+  } catch (const ErrorType& error) {
+    return error.what();
+  }
+  return "";
+}
+
+class DatabaseTest : public ::testing::Test {
+ protected:
+  std::filesystem::path Path() const { return directory_.Path() / "my database.db"; }
+
+  Database Open() const { return Database(Path(), sqlite::Access::kReadWrite, kLockTimeout); }
+
+  void Write(Schema schema = Schema::kColmap38) const {
+    WriteSyntheticDatabase(Path(), schema, MakePlaces(2, 3, 10, 1));
+  }
+
+  void Execute(const std::string& sql) const {
+    sqlite::Connection(Path(), sqlite::Access::kReadWrite, 1).Execute(sql);
+  }
+
+  std::int64_t Query(const std::string& sql) const {
+    sqlite::Connection database(Path(), sqlite::Access::kRead, 1);
+    sqlite::Statement statement(database, sql);
+    return statement.Step() && !statement.IsNull(0) ? statement.Int(0) : -1;
+  }
+
+  std::string ReadImagesMessage() const {
+    return MessageOf([this] { Open().ReadImages(); });
+  }
+
+  TestDirectory directory_;
+};
+
+PairRows MakeRows(ImagePair pair, std::uint32_t num_inliers) {
+  PairRows rows;
+  rows.pair = pair;
+  rows.num_matches = num_inliers;
+  for (std::uint32_t i = 0; i < 2 * num_inliers; ++i) {
+    rows.matches.insert(rows.matches.end(), {static_cast<std::uint8_t>(i / 2), 0, 0, 0});
+  }
+  rows.num_inliers = num_inliers;
+  rows.inliers = rows.matches;
+  rows.config = num_inliers > 0 ? 3 : 0;
+  return rows;
+}
+
+class AnySchema : public DatabaseTest, public ::testing::WithParamInterface<Schema> {};
+
+TEST_P(AnySchema, ReadsImagesAndFeatures) {
+  const std::vector<SyntheticImage> images = MakePlaces(2, 3, 10, 1);
+  WriteSyntheticDatabase(Path(), GetParam(), images);
+  Database database = Open();
+  const std::vector<ImageRecord> records = database.ReadImages();
+  ASSERT_THAT(records, SizeIs(6));
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    EXPECT_EQ(records[i].id, i + 1);
+    EXPECT_EQ(records[i].name, images[i].name);
+    EXPECT_EQ(records[i].num_features, 10U);
+    EXPECT_EQ(database.ReadDescriptors(records[i].id).data, images[i].descriptors.data);
+    const Keypoints keypoints = database.ReadKeypoints(records[i].id);
+    EXPECT_EQ(keypoints.num_rows, 10U);
+    EXPECT_FLOAT_EQ(keypoints.Scale(5), 1.5F);
+  }
+}
+
+TEST_P(AnySchema, WritesPairsAndReadsThemBack) {
+  Write(GetParam());
+  Database database = Open();
+  PairRows edge = MakeRows(ImagePair(1, 2), 20);
+  edge.geometry[0] = sqlite::Blob(72, 9);
+  edge.geometry[1] = sqlite::Blob(72, 0);
+  database.WritePairs({edge, MakeRows(ImagePair(4, 3), 0)});
+  const std::vector<TestedPair> tested = database.ReadTestedPairs();
+  ASSERT_THAT(tested, SizeIs(2));
+  EXPECT_EQ(tested[0].pair, ImagePair(1, 2));
+  EXPECT_EQ(tested[0].num_inliers, 20U);
+  EXPECT_EQ(tested[0].config, 3);
+  EXPECT_EQ(tested[1].pair, ImagePair(3, 4));
+  EXPECT_EQ(tested[1].num_inliers, 0U);
+  EXPECT_EQ(Query("SELECT length(F) FROM two_view_geometries WHERE rows = 20"), 72);
+  EXPECT_EQ(Query("SELECT length(data) FROM matches WHERE rows = 20"), 160);
+  EXPECT_EQ(Query("SELECT count(*) FROM matches WHERE rows = 0 AND cols = 2 AND data IS NULL"), 1);
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries WHERE rows = 0 AND cols = 2 AND data "
+                  "IS NULL AND config = 0 AND F IS NULL"),
+            1);
+}
+
+TEST_P(AnySchema, MarksUnsetMatricesAsThatVersionDoes) {
+  Write(GetParam());
+  Database database = Open();
+  PairRows edge = MakeRows(ImagePair(1, 2), 20);
+  edge.geometry[0] = sqlite::Blob(72, 9);
+  edge.geometry[1] = sqlite::Blob(72, 0);  // As COLMAP 3.8 writes it.
+  database.WritePairs({edge});             // H, qvec and tvec as later versions do.
+  const bool zeros = GetParam() == Schema::kColmap38;
+  EXPECT_EQ(Query("SELECT E = zeroblob(72) AND H = zeroblob(72) AND qvec = zeroblob(32) AND tvec = "
+                  "zeroblob(24) FROM two_view_geometries"),
+            zeros ? 1 : -1);
+  EXPECT_EQ(Query("SELECT E IS NULL AND H IS NULL AND qvec IS NULL AND tvec IS NULL FROM "
+                  "two_view_geometries"),
+            zeros ? 0 : 1);
+}
+
+TEST_P(AnySchema, KeepsAPoseWithoutTranslationWhole) {
+  // As COLMAP 3.9 to 3.13 write it where no relative pose was asked for. COLMAP 4 refuses half a
+  // pose.
+  Write(GetParam());
+  Database database = Open();
+  PairRows edge = MakeRows(ImagePair(1, 2), 20);
+  edge.geometry[3] = sqlite::Blob(32, 0);
+  (*edge.geometry[3])[7] = 0x3F;
+  edge.geometry[4] = sqlite::Blob(24, 0);
+  database.WritePairs({edge});
+  EXPECT_EQ(Query("SELECT length(qvec) = 32 AND tvec = zeroblob(24) FROM two_view_geometries"), 1);
+}
+
+TEST_P(AnySchema, LeavesTheVersionAlone) {
+  Write(GetParam());
+  const std::int64_t version = Query("PRAGMA user_version");
+  Open().WritePairs({MakeRows(ImagePair(1, 2), 20)});
+  EXPECT_EQ(Query("PRAGMA user_version"), version);
+  sqlite::Connection database(Path(), sqlite::Access::kRead, 1);
+  sqlite::Statement check(database, "PRAGMA integrity_check");
+  ASSERT_TRUE(check.Step());
+  EXPECT_EQ(check.Text(0), "ok");
+}
+
+INSTANTIATE_TEST_SUITE_P(Database, AnySchema,
+                         ::testing::Values(Schema::kColmap38, Schema::kColmap310,
+                                           Schema::kColmap42));
+
+TEST_F(DatabaseTest, ImagesWithoutFeaturesAreData) {
+  std::vector<SyntheticImage> images = MakePlaces(1, 3, 10, 1);
+  images[1].descriptors = {};
+  images[1].keypoints = {};
+  WriteSyntheticDatabase(Path(), Schema::kColmap38, images);
+  Execute("DELETE FROM descriptors WHERE image_id = 3");
+  Database database = Open();
+  const std::vector<ImageRecord> records = database.ReadImages();
+  EXPECT_EQ(records[0].num_features, 10U);
+  EXPECT_EQ(records[1].num_features, 0U);
+  EXPECT_EQ(records[2].num_features, 0U);
+  EXPECT_EQ(database.ReadDescriptors(2).num_rows, 0U);
+  EXPECT_EQ(database.ReadDescriptors(3).num_rows, 0U);
+}
+
+TEST_F(DatabaseTest, MissingFile) {
+  EXPECT_THAT(MessageOf([this] { Open(); }),
+              AllOf(HasSubstr("no database at"), HasSubstr("feature_extractor")));
+  EXPECT_FALSE(std::filesystem::exists(Path()));
+}
+
+TEST_F(DatabaseTest, Directory) {
+  std::filesystem::create_directory(Path());
+  EXPECT_THAT(MessageOf([this] { Open(); }), HasSubstr("is a directory"));
+}
+
+TEST_F(DatabaseTest, EmptyFile) {
+  std::ofstream(Path()).close();
+  EXPECT_THAT(MessageOf([this] { Open(); }), HasSubstr("is an empty file"));
+}
+
+TEST_F(DatabaseTest, NotSqlite) {
+  std::ofstream(Path()) << std::string(5000, 'x');
+  EXPECT_THAT(MessageOf([this] { Open(); }), HasSubstr("is not a SQLite database"));
+}
+
+TEST_F(DatabaseTest, NotColmap) {
+  { CreateColmapDatabase(Path(), Schema::kColmap38).Execute("DROP TABLE descriptors"); }
+  EXPECT_THAT(MessageOf([this] { Open(); }),
+              AllOf(HasSubstr("not a database of COLMAP"), HasSubstr("no table descriptors")));
+}
+
+TEST_F(DatabaseTest, TooOldForColmap38) {
+  {
+    CreateColmapDatabase(Path(), Schema::kColmap38)
+        .Execute("ALTER TABLE two_view_geometries DROP COLUMN H");
+  }
+  EXPECT_THAT(MessageOf([this] { Open(); }), HasSubstr("has no column H"));
+}
+
+TEST_F(DatabaseTest, NoImages) {
+  CreateColmapDatabase(Path(), Schema::kColmap38);
+  EXPECT_THAT(ReadImagesMessage(), HasSubstr("has no images"));
+}
+
+TEST_F(DatabaseTest, NoFeaturesAtAll) {
+  Write();
+  Execute("DELETE FROM descriptors");
+  EXPECT_THAT(ReadImagesMessage(), HasSubstr("None of the 6 images"));
+}
+
+TEST_F(DatabaseTest, TruncatedFile) {
+  Write();
+  Execute("PRAGMA wal_checkpoint(TRUNCATE)");
+  std::filesystem::resize_file(Path(), std::filesystem::file_size(Path()) / 2);
+  EXPECT_THAT(MessageOf([this] {
+                Database database = Open();
+                for (const ImageRecord& image : database.ReadImages()) {
+                  database.ReadDescriptors(image.id);
+                }
+              }),
+              HasSubstr("damaged"));
+}
+
+struct Corruption {
+  std::string name;
+  std::string sql;
+  std::string message;
+};
+
+class Corrupt : public DatabaseTest, public ::testing::WithParamInterface<Corruption> {};
+
+TEST_P(Corrupt, NamesTheImageAndTheFault) {
+  Write();
+  Execute(GetParam().sql + " WHERE image_id = 4");
+  EXPECT_THAT(ReadImagesMessage(),
+              AllOf(HasSubstr("\"place1/photo 0.jpg\" (id 4)"), HasSubstr(GetParam().message)));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Features, Corrupt,
+    ::testing::Values(
+        Corruption{"Short", "UPDATE descriptors SET data = zeroblob(1279)", "the blob has 1279"},
+        Corruption{"Missing", "UPDATE descriptors SET data = NULL", "the blob has 0"},
+        Corruption{"Rows", "UPDATE descriptors SET rows = 11", "11 x 128"},
+        Corruption{"Negative", "UPDATE descriptors SET rows = -1", "-1 x 128"},
+        Corruption{"Huge", "UPDATE descriptors SET rows = 9223372036854775807",
+                   "the blob has 1280"},
+        Corruption{"Float", "UPDATE descriptors SET data = zeroblob(5120)", "floating-point"},
+        Corruption{"Dim", "UPDATE descriptors SET cols = 64, data = zeroblob(640)", "10 x 64"},
+        Corruption{"KeypointRows", "UPDATE keypoints SET rows = 9", "10 descriptors but 9"},
+        Corruption{"KeypointCols", "UPDATE keypoints SET cols = 5", "5 columns"},
+        Corruption{"KeypointData", "UPDATE keypoints SET data = zeroblob(12)", "has 12 bytes"}),
+    [](const auto& corruption) { return corruption.param.name; });
+
+TEST_F(DatabaseTest, FeaturesOfAnotherType) {
+  Write(Schema::kColmap42);
+  Execute("UPDATE descriptors SET type = 1 WHERE image_id = 2");
+  EXPECT_THAT(ReadImagesMessage(), AllOf(HasSubstr("(id 2)"), HasSubstr("ALIKED")));
+}
+
+TEST_F(DatabaseTest, ImageIdOutOfRange) {
+  Write();
+  Execute(
+      "PRAGMA ignore_check_constraints = 1; UPDATE images SET image_id = 2147483647 WHERE image_id "
+      "= 6");
+  EXPECT_THAT(ReadImagesMessage(), HasSubstr("outside COLMAP's range"));
+}
+
+TEST_F(DatabaseTest, WritesAreRolledBackUnlessAllSucceed) {
+  Write();
+  Database database = Open();
+  Execute(
+      "CREATE TRIGGER refuse BEFORE INSERT ON two_view_geometries WHEN NEW.rows = 7 BEGIN "
+      "SELECT RAISE(ABORT, 'refused by the test'); END");
+  EXPECT_THAT(MessageOf([&] {
+                database.WritePairs({MakeRows(ImagePair(1, 2), 20), MakeRows(ImagePair(1, 3), 7)});
+              }),
+              HasSubstr("refused by the test"));
+  EXPECT_EQ(Query("SELECT count(*) FROM matches"), 0);
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 0);
+  database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 1);
+}
+
+TEST_F(DatabaseTest, PairsOfOthersAreNotOverwritten) {
+  Write();
+  Database database = Open();
+  database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
+  database.WritePairs({MakeRows(ImagePair(1, 2), 5), MakeRows(ImagePair(1, 3), 6)});
+  EXPECT_EQ(Query("SELECT rows FROM two_view_geometries ORDER BY pair_id"), 20);
+  EXPECT_EQ(Query("SELECT rows FROM matches ORDER BY pair_id"), 20);
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 2);
+}
+
+TEST_F(DatabaseTest, TestedPairsAscendAndKeysOfNoPairAreLeftOut) {
+  Write();
+  Database database = Open();
+  database.WritePairs({MakeRows(ImagePair(4, 5), 20), MakeRows(ImagePair(1, 2), 20)});
+  const std::vector<std::string> keys = {std::to_string(kMaxNumImages * 3 + 1), "-5", "7",
+                                         std::to_string(kMaxNumImages), "9223372036854775807"};
+  for (const std::string& key : keys) {
+    Execute("INSERT INTO two_view_geometries(pair_id, rows, cols, config) VALUES(" + key +
+            ", 20, 2, 2)");
+  }
+  std::vector<ImagePair> pairs;
+  for (const TestedPair& tested : database.ReadTestedPairs()) pairs.push_back(tested.pair);
+  EXPECT_THAT(pairs, ElementsAre(ImagePair(1, 2), ImagePair(4, 5)));
+}
+
+TEST_F(DatabaseTest, MatchesWithoutGeometryAreReplaced) {
+  Write();
+  Execute("INSERT INTO matches VALUES(" + std::to_string(EncodePair(ImagePair(1, 2))) +
+          ", 0, 2, NULL)");
+  Open().WritePairs({MakeRows(ImagePair(1, 2), 20)});
+  EXPECT_EQ(Query("SELECT rows FROM matches"), 20);
+}
+
+TEST_F(DatabaseTest, WaitsForALockAndSaysWhoHoldsIt) {
+  Write();
+  Database database = Open();
+  int ready[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    try {
+      sqlite::Connection other(Path(), sqlite::Access::kReadWrite, 1);
+      other.Execute("BEGIN IMMEDIATE");
+      if (::write(ready[1], "x", 1) == 1) ::pause();
+    } catch (...) {
+    }
+    ::_exit(1);
+  }
+  char byte = 0;
+  ASSERT_EQ(::read(ready[0], &byte, 1), 1);
+  const std::string message =
+      MessageOf<DatabaseLockedError>([&] { database.WritePairs({MakeRows(ImagePair(1, 2), 20)}); });
+  EXPECT_THAT(message,
+              AllOf(HasSubstr("another process kept it locked for 0.2 s"),
+                    HasSubstr("process " + std::to_string(child)), HasSubstr("database_test")));
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  ::close(ready[0]);
+  ::close(ready[1]);
+  database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 1);
+}
+
+TEST_F(DatabaseTest, ReadOnlyFile) {
+  Write();
+  Execute("PRAGMA journal_mode = DELETE");
+  std::filesystem::permissions(Path(), std::filesystem::perms(0444));
+  std::filesystem::permissions(directory_.Path(), std::filesystem::perms(0555));
+  // Root may write to everything: be nobody for a moment.
+  const bool is_root = ::geteuid() == 0;
+  ASSERT_TRUE(!is_root || ::seteuid(65534) == 0);
+  const std::string message = MessageOf([&] { Open(); });
+  ASSERT_TRUE(!is_root || ::seteuid(0) == 0);
+  std::filesystem::permissions(directory_.Path(), std::filesystem::perms(0755));
+  EXPECT_THAT(message, HasSubstr("read-only"));
+}
+
+TEST(IsEdge, FollowsColmap) {
+  EXPECT_TRUE(IsEdge(15, 2, 15));
+  EXPECT_TRUE(IsEdge(15, 8, 15));
+  EXPECT_FALSE(IsEdge(14, 2, 15));
+  for (const int config : {0, 1, 7}) EXPECT_FALSE(IsEdge(100, config, 15)) << config;
+}
+
+TEST(Keypoints, ScaleOfEveryKind) {
+  Keypoints keypoints{1, 2, {3, 4}};
+  EXPECT_EQ(keypoints.Scale(0), 0);
+  keypoints = {1, 4, {3, 4, 2.5F, 1}};
+  EXPECT_EQ(keypoints.Scale(0), 2.5F);
+  // A rotation by 30 degrees times diag(4, 2).
+  keypoints = {1, 6, {3, 4, 3.4641016F, -1, 2, 1.7320508F}};
+  EXPECT_FLOAT_EQ(keypoints.Scale(0), 3);
+}
+
+struct SchemaPair {
+  Schema source;
+  Schema target;
+};
+
+class ShardTest : public DatabaseTest, public ::testing::WithParamInterface<SchemaPair> {};
+
+TEST_P(ShardTest, HoldsTheImagesOfItsPairs) {
+  Write(GetParam().source);
+  Execute("INSERT INTO matches VALUES(" + std::to_string(EncodePair(ImagePair(2, 5))) +
+          ", 1, 2, zeroblob(8)), (" + std::to_string(EncodePair(ImagePair(2, 3))) +
+          ", 1, 2, zeroblob(8))");
+  const std::filesystem::path shard_path = directory_.Path() / "shard.db";
+  CreateColmapDatabase(shard_path, GetParam().target);
+  FillShard(shard_path, Path(), kLockTimeout, {ImagePair(2, 5), ImagePair(3, 5)});
+
+  sqlite::Connection shard(shard_path, sqlite::Access::kRead, 1);
+  sqlite::Statement images(shard, "SELECT image_id, name FROM images ORDER BY image_id");
+  for (const int id : {2, 3, 5}) {
+    ASSERT_TRUE(images.Step());
+    EXPECT_EQ(images.Int(0), id);
+    EXPECT_EQ(images.Text(1), ShardImageName(static_cast<ImageId>(id)));
+  }
+  EXPECT_FALSE(images.Step());
+  sqlite::Statement counts(
+      shard,
+      "SELECT (SELECT count(*) FROM cameras), (SELECT count(*) FROM keypoints), "
+      "(SELECT count(*) FROM descriptors), (SELECT count(*) FROM matches)");
+  counts.Step();
+  EXPECT_EQ(counts.Int(0), 1);
+  EXPECT_EQ(counts.Int(1), 3);
+  EXPECT_EQ(counts.Int(2), 3);
+  EXPECT_EQ(counts.Int(3), 1);
+  sqlite::Statement descriptors(shard, "SELECT data FROM descriptors WHERE image_id = 5");
+  descriptors.Step();
+  EXPECT_EQ(descriptors.CopyBlob(0), Open().ReadDescriptors(5).data);
+}
+
+INSTANTIATE_TEST_SUITE_P(AcrossVersions, ShardTest,
+                         ::testing::Values(SchemaPair{Schema::kColmap38, Schema::kColmap38},
+                                           SchemaPair{Schema::kColmap38, Schema::kColmap42},
+                                           SchemaPair{Schema::kColmap42, Schema::kColmap38},
+                                           SchemaPair{Schema::kColmap310, Schema::kColmap42},
+                                           SchemaPair{Schema::kColmap42, Schema::kColmap42}));
+
+class ShardResults : public DatabaseTest {
+ protected:
+  std::vector<PairRows> Read() const {
+    return ReadShard(Path(), {ImagePair(1, 2)}, {{1, 10}, {2, 10}});
+  }
+  void Result(const std::string& match_values, const std::string& geometry_values) const {
+    const std::string id = std::to_string(EncodePair(ImagePair(1, 2)));
+    CreateColmapDatabase(Path(), Schema::kColmap38);
+    Execute("INSERT INTO matches VALUES(" + id + ", " + match_values + ")");
+    Execute("INSERT INTO two_view_geometries VALUES(" + id + ", " + geometry_values + ")");
+  }
+};
+
+TEST_F(ShardResults, AreReadWhole) {
+  Result("2, 2, x'01000000020000000300000009000000'",
+         "1, 2, x'0300000009000000', 3, zeroblob(72), NULL, zeroblob(72), NULL, NULL");
+  const std::vector<PairRows> results = Read();
+  ASSERT_THAT(results, SizeIs(1));
+  EXPECT_EQ(results[0].num_matches, 2U);
+  EXPECT_EQ(results[0].num_inliers, 1U);
+  EXPECT_THAT(results[0].inliers, ElementsAre(3, 0, 0, 0, 9, 0, 0, 0));
+  EXPECT_EQ(results[0].config, 3);
+  EXPECT_TRUE(results[0].geometry[0].has_value());
+  EXPECT_FALSE(results[0].geometry[1].has_value());
+}
+
+TEST_F(ShardResults, MissingPair) {
+  CreateColmapDatabase(Path(), Schema::kColmap38);
+  EXPECT_THAT(MessageOf([this] { Read(); }), HasSubstr("no result"));
+}
+
+TEST_F(ShardResults, MatchesOfFeaturesThatDoNotExist) {
+  Result("1, 2, x'010000000A000000'", "0, 2, NULL, 0, NULL, NULL, NULL, NULL, NULL");
+  EXPECT_THAT(MessageOf([this] { Read(); }), HasSubstr("features that the images do not have"));
+}
+
+TEST_F(ShardResults, BlobsOfTheWrongSize) {
+  Result("2, 2, x'0100000001000000'", "0, 2, NULL, 0, NULL, NULL, NULL, NULL, NULL");
+  EXPECT_THAT(MessageOf([this] { Read(); }), HasSubstr("wrong size"));
+}
+
+TEST_F(ShardResults, NumbersThatOverflow) {
+  Result("2305843009213693952, 2, NULL", "0, 2, NULL, 0, NULL, NULL, NULL, NULL, NULL");
+  EXPECT_THAT(MessageOf([this] { Read(); }), HasSubstr("wrong size"));
+  Execute("UPDATE matches SET rows = 0");
+  Execute("UPDATE two_view_geometries SET config = 4294967299");
+  EXPECT_THAT(MessageOf([this] { Read(); }), HasSubstr("configuration 4294967299"));
+}
+
+TEST_F(ShardResults, MatricesOfTheWrongSize) {
+  Result("0, 2, NULL", "0, 2, NULL, 0, zeroblob(71), NULL, NULL, NULL, NULL");
+  EXPECT_THAT(MessageOf([this] { Read(); }), HasSubstr("matrix F of the wrong size"));
+}
+
+TEST_F(ShardResults, UnknownConfiguration) {
+  Result("0, 2, NULL", "0, 2, NULL, 99, NULL, NULL, NULL, NULL, NULL");
+  EXPECT_THAT(MessageOf([this] { Read(); }), HasSubstr("configuration 99"));
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch

@@ -1,0 +1,128 @@
+#!/bin/bash
+# The program as scripts see it: options, exit codes, messages, interruptions. A test double stands in for
+# COLMAP.
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "$0")/common.sh"
+
+fake=$build/tests/fake_colmap
+database="$work/photos of a place.db"
+"$build/tests/make_synthetic_database" "$database" 4 10
+cp "$database" "$work/untouched.db"
+export TMPDIR=$work/tmp
+mkdir -p "$TMPDIR"
+run=("$matcher" --database_path "$database" --colmap_path "$fake")
+
+echo "== Options"
+expect_exit 0 '--GraphMatching.max_tests_for_sampling' "$matcher" -h
+expect_exit 0 'graphmatch_matcher 0.' "$matcher" --version
+expect_exit 1 '--database_path is missing' "$matcher"
+expect_exit 1 "unrecognised option '--no_such_option'" "${run[@]}" --no_such_option 1
+expect_exit 1 'must be at least 1' "${run[@]}" --GraphMatching.max_num_neighbors 0
+expect_exit 1 'must be one of carry, floor, round' "${run[@]}" --GraphMatching.sampling_schedule x
+expect_exit 1 'must be a number' "${run[@]}" --SiftMatching.max_ratio zero
+expect_exit 1 'the same option with different values' "${run[@]}" --SiftMatching.max_error 4 \
+  --TwoViewGeometry.max_error 5
+expect_exit 1 'must be at least 1, or -1' "${run[@]}" --SiftMatching.num_threads 0
+
+echo "== Wrong databases, programs and directories"
+expect_exit 2 'There is no database at' "$matcher" --database_path "$work/none.db"
+echo "not a database, but long enough to be looked at as one" >"$work/text.db"
+expect_exit 2 'is not a SQLite database' "$matcher" --database_path "$work/text.db"
+expect_exit 4 'There is no program at /nowhere/colmap' \
+  "$matcher" --database_path "$database" --colmap_path /nowhere/colmap
+expect_exit 4 'is not COLMAP' "$matcher" --database_path "$database" --colmap_path /bin/echo
+expect_exit 5 'Cannot make a working directory' "${run[@]}" --GraphMatching.work_path /nowhere
+FAKE_COLMAP_FAULT=exit FAKE_COLMAP_FAULT_PAIR=all \
+  expect_exit 4 'COLMAP fails on every pair' "${run[@]}"
+(($(count_tested "$database") == 0)) || fail "a failed run left pairs"
+
+echo "== A locked database"
+# The writer keeps its lock for as long as its input stays open.
+mkfifo "$work/hold"
+sqlite3 "$database" <"$work/hold" &
+exec 3>"$work/hold"
+echo 'BEGIN IMMEDIATE;' >&3
+for _ in {1..100}; do
+  sqlite3 "$database" 'BEGIN IMMEDIATE' 2>/dev/null || break
+  sleep 0.05
+done
+expect_exit 3 'another process kept it locked for 0.3 s (held by process' \
+  "${run[@]}" --GraphMatching.lock_timeout 0.3
+exec 3>&-
+wait
+
+echo "== A run, and another that finds nothing to do"
+# shellcheck disable=SC2016
+expect_exit 0 'Pairs tested' "${run[@]}" --VocabTreeMatching.vocab_tree_path tree.bin \
+  --SiftMatching.use_gpu 0 --TwoViewGeometry.min_num_inliers 15
+grep -q 'VocabTreeMatching.vocab_tree_path has no effect' "$work/output.txt" ||
+  fail "an unused option was not mentioned"
+check_integrity "$database"
+tested_pairs "$database" >"$work/undisturbed.txt"
+(($(count_tested "$database") > 100)) || fail "too few pairs"
+expect_exit 0 'Pairs tested       0 of 780' "${run[@]}" --SiftMatching.use_gpu 0
+tested_pairs "$database" | cmp - "$work/undisturbed.txt"
+
+echo "== The same pairs on any number of threads, and with another name for the same option"
+for option in --SiftMatching.num_threads --FeatureMatching.num_threads; do
+  cp "$work/untouched.db" "$work/threads.db"
+  expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/threads.db" --colmap_path "$fake" \
+    "$option" 5
+  tested_pairs "$work/threads.db" | cmp - "$work/undisturbed.txt"
+done
+
+echo "== One pair that COLMAP crashes on"
+cp "$work/untouched.db" "$work/crash.db"
+FAKE_COLMAP_FAULT=crash FAKE_COLMAP_FAULT_PAIR='1 2' \
+  expect_exit 0 'COLMAP failed on the pair "place0/photo 0.jpg" and "place0/photo 1.jpg"' \
+  "$matcher" --database_path "$work/crash.db" --colmap_path "$fake"
+[[ $(sqlite3 "$work/crash.db" "SELECT count(*) FROM two_view_geometries
+     WHERE pair_id = 2147483647 + 2") == 0 ]] || fail "the guilty pair is in the database"
+(($(count_tested "$work/crash.db") > 100)) || fail "more than the guilty pair was lost"
+# The next run tries it again; this COLMAP finds an edge there, which leads on to no more than a few pairs.
+before=$(count_tested "$work/crash.db")
+expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/crash.db" --colmap_path "$fake"
+(($(count_tested "$work/crash.db") <= before + 10)) || fail "the next run tested too much"
+
+echo "== Asked to stop before the first pair"
+cp "$work/untouched.db" "$work/early.db"
+FAKE_COLMAP_HELP_DELAY_MS=5000 "$matcher" --database_path "$work/early.db" --colmap_path "$fake" \
+  >"$work/early.txt" 2>&1 &
+pid=$!
+sleep 0.5
+kill -INT "$pid"
+code=0
+wait "$pid" || code=$?
+[[ $code == 130 ]] || { cat "$work/early.txt"; fail "exit code $code"; }
+
+echo "== Ctrl-C, SIGTERM and kill -9 at any time; then the same command goes on"
+export FAKE_COLMAP_DELAY_MS=5
+wanted=20
+for signal in INT TERM KILL INT KILL KILL HUP; do
+  cp "$work/untouched.db" "$work/interrupted.db"
+  "$matcher" --database_path "$work/interrupted.db" --colmap_path "$fake" \
+    >"$work/interrupted.txt" 2>&1 &
+  pid=$!
+  wanted=$((wanted + 23))
+  while kill -0 "$pid" 2>/dev/null && (($(count_tested "$work/interrupted.db" || echo 0) < wanted)); do
+    sleep 0.01
+  done
+  kill "-$signal" "$pid" 2>/dev/null || true
+  code=0
+  wait "$pid" || code=$?
+  if [[ $signal == KILL ]]; then
+    [[ $code == 137 ]] || fail "exit code $code after SIGKILL"
+  else
+    [[ $code == 130 ]] || fail "exit code $code after SIG$signal"
+    grep -q 'run the same command again' "$work/interrupted.txt" || fail "no word on how to go on"
+  fi
+  check_integrity "$work/interrupted.db"
+  before=$(count_tested "$work/interrupted.db")
+  expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/interrupted.db" --colmap_path "$fake"
+  tested_pairs "$work/interrupted.db" | cmp - "$work/undisturbed.txt"
+  echo "SIG$signal at $before of $(count_tested "$work/interrupted.db") pairs: went on"
+done
+
+echo "== Nothing is left behind"
+# A run that was killed with -9 cannot clean up; all others have.
+(($(find "$TMPDIR" -mindepth 1 -maxdepth 1 | wc -l) <= 3)) || { ls -la "$TMPDIR"; fail "files in TMPDIR"; }

@@ -1,0 +1,39 @@
+# shellcheck shell=bash disable=SC2034  # What it defines is used by the tests.
+# Sourced by the end-to-end tests: bash NAME.sh BUILD_DIR WORK_DIR.
+set -euo pipefail
+
+build=$1
+work=$2
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+matcher=$build/colmap_graphmatch/graphmatch_matcher
+rm -rf "$work"
+mkdir -p "$work"
+
+fail() {
+  echo "FAILED: $*" >&2
+  exit 1
+}
+
+# expect_exit CODE TEXT COMMAND...: the command ends with the code, and its output contains the text.
+expect_exit() {
+  local expected=$1 text=$2 code=0
+  shift 2
+  "$@" >"$work/output.txt" 2>&1 || code=$?
+  [[ $code == "$expected" ]] || { cat "$work/output.txt"; fail "exit code $code, not $expected: $*"; }
+  grep -q -F -- "$text" "$work/output.txt" || { cat "$work/output.txt"; fail "no '$text': $*"; }
+}
+
+# The tested pairs of a database with their outcomes, one a line.
+tested_pairs() {
+  sqlite3 "$1" 'SELECT pair_id, rows > 0 FROM two_view_geometries ORDER BY pair_id'
+}
+
+count_tested() { sqlite3 "$1" 'SELECT count(*) FROM two_view_geometries'; }
+
+check_integrity() {
+  [[ $(sqlite3 "$1" 'PRAGMA integrity_check') == ok ]] || fail "$1 is damaged"
+  local lonely
+  lonely=$(sqlite3 "$1" 'SELECT count(*) FROM two_view_geometries WHERE pair_id NOT IN
+                         (SELECT pair_id FROM matches)')
+  [[ $lonely == 0 ]] || fail "$1 has $lonely geometries without matches"
+}

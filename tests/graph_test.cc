@@ -1,0 +1,661 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/random.h"
+#include "colmap_graphmatch/graph/components.h"
+#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/propagation.h"
+#include "colmap_graphmatch/graph/sampling.h"
+#include "colmap_graphmatch/verification/replay_verifier.h"
+#include "tests/support/recording_verifier.h"
+#include "tests/support/reference_graphmatch.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr std::size_t kDim = 16;
+
+// Places with photos taken on walks: photos of a place look like it (noise apart), and those near
+// each other on the walk match.
+struct Scene {
+  std::vector<float> vectors;
+  std::set<VertexPair> edges;
+  std::size_t num_vertices = 0;
+};
+
+Scene MakeScene(int num_places, int photos_a_place, int reach, double noise, std::uint64_t seed) {
+  Random random({seed});
+  const auto gauss = [&random] {
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) sum += random.Uniform();
+    return sum;
+  };
+  Scene scene;
+  for (int place = 0; place < num_places; ++place) {
+    std::vector<double> center(kDim);
+    for (double& value : center) value = gauss();
+    const auto first = static_cast<Vertex>(scene.num_vertices);
+    for (int photo = 0; photo < photos_a_place; ++photo) {
+      std::vector<double> vector(kDim);
+      double norm = 0;
+      for (std::size_t d = 0; d < kDim; ++d) {
+        vector[d] = center[d] + noise * gauss();
+        norm += vector[d] * vector[d];
+      }
+      for (const double value : vector) {
+        scene.vectors.push_back(static_cast<float>(value / std::sqrt(norm)));
+      }
+      for (int other = std::max(0, photo - reach); other < photo; ++other) {
+        scene.edges.emplace(first + static_cast<Vertex>(other), first + static_cast<Vertex>(photo));
+      }
+      ++scene.num_vertices;
+    }
+  }
+  return scene;
+}
+
+Ranking MakeRanking(const Scene& scene, std::size_t list_length = 512) {
+  ThreadPool threads(2);
+  RankingOptions options;
+  options.list_length = list_length;
+  return Ranking(options, scene.num_vertices, kDim, scene.vectors, threads);
+}
+
+// Not 0, 1, 2, ...: the loop must not take vertices for ids.
+std::vector<ImageId> MakeIds(std::size_t num_vertices) {
+  std::vector<ImageId> ids;
+  for (std::size_t i = 0; i < num_vertices; ++i) ids.push_back(static_cast<ImageId>(7 + 3 * i));
+  return ids;
+}
+
+std::set<ImagePair> ImageEdges(const Scene& scene, const std::vector<ImageId>& ids) {
+  std::set<ImagePair> edges;
+  for (const auto& [a, b] : scene.edges) edges.emplace(ids[a], ids[b]);
+  return edges;
+}
+
+GraphMatchResult RunLoop(const GraphMatchOptions& options, const Ranking& ranking,
+                         RecordingVerifier* verifier, int num_threads = 2) {
+  ThreadPool threads(num_threads);
+  return RunGraphMatch(options, ranking, MakeIds(ranking.NumVertices()), *verifier, threads,
+                       nullptr);
+}
+
+std::vector<std::set<ImagePair>> ReferenceBatches(const GraphMatchOptions& options,
+                                                  const Ranking& ranking, const Scene& scene) {
+  const std::vector<ImageId> ids = MakeIds(ranking.NumVertices());
+  std::vector<std::set<ImagePair>> batches;
+  for (const std::set<VertexPair>& batch : ReferenceGraphMatch(options, ranking, scene.edges)) {
+    batches.emplace_back();
+    for (const auto& [a, b] : batch) batches.back().emplace(ids[a], ids[b]);
+  }
+  return batches;
+}
+
+std::vector<std::set<ImagePair>> AsSets(const std::vector<std::vector<ImagePair>>& batches) {
+  std::vector<std::set<ImagePair>> sets;
+  for (const std::vector<ImagePair>& batch : batches) sets.emplace_back(batch.begin(), batch.end());
+  return sets;
+}
+
+TEST(Options, FormulaOfThePaperForMaxTestsForSampling) {
+  const GraphMatchOptions options;
+  EXPECT_EQ(options.MaxTestsForSampling(569), 10);
+  EXPECT_EQ(options.MaxTestsForSampling(1497), 25);
+  EXPECT_EQ(options.MaxTestsForSampling(15685), 120);
+  EXPECT_EQ(options.TestsInIteration(0, 569), 1);
+  EXPECT_EQ(options.TestsInIteration(9, 1497), 2);
+  EXPECT_EQ(options.TestsInIteration(10, 1497), 0);
+}
+
+TEST(Options, SchedulesSpreadTheBudget) {
+  GraphMatchOptions options;
+  options.max_tests_for_sampling = 27;
+  const auto total = [&options] {
+    int sum = 0;
+    for (int i = 0; i < options.number_sample_iterations; ++i) {
+      sum += options.TestsInIteration(i, 1000);
+    }
+    return sum;
+  };
+  EXPECT_EQ(total(), 20);
+  options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kRound;
+  EXPECT_EQ(total(), 30);
+  options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kCarry;
+  EXPECT_EQ(total(), 27);
+  options.max_tests_for_sampling = 3;
+  EXPECT_EQ(total(), 3);
+}
+
+TEST(Options, RejectsWhatCannotBe) {
+  for (const auto& break_option : std::vector<void (*)(GraphMatchOptions*)>{
+           [](GraphMatchOptions* o) { o->number_sample_iterations = -1; },
+           [](GraphMatchOptions* o) { o->max_num_neighbors = 0; },
+           [](GraphMatchOptions* o) { o->num_to_propagate = -1; },
+           [](GraphMatchOptions* o) { o->max_tests_for_sampling = -1; }}) {
+    GraphMatchOptions options;
+    EXPECT_NO_THROW(options.Check());
+    break_option(&options);
+    EXPECT_THROW(options.Check(), OptionsError);
+  }
+}
+
+TEST(MatchingGraph, KeepsTestedPairsAndEdgesApart) {
+  MatchingGraph graph(5);
+  graph.Add({{{0, 3}, true}, {{0, 1}, false}});
+  graph.Add({{{0, 2}, true}, {{1, 4}, true}});
+  EXPECT_EQ(graph.NumTested(), 4U);
+  EXPECT_EQ(graph.NumEdges(), 3U);
+  EXPECT_THAT(graph.Neighbors(0), ElementsAre(2, 3));
+  EXPECT_TRUE(graph.IsTested(1, 0));
+  EXPECT_TRUE(graph.IsTested(0, 3));
+  EXPECT_FALSE(graph.IsTested(3, 4));
+  EXPECT_THAT(graph.Edges(), ElementsAre(VertexPair(0, 3), VertexPair(0, 2), VertexPair(1, 4)));
+}
+
+TEST(Components, FollowTheEdges) {
+  Components components(6);
+  EXPECT_EQ(components.NumIsolated(), 6U);
+  EXPECT_EQ(components.Largest(), 0U);
+  components.AddEdge({0, 1});
+  components.AddEdge({2, 3});
+  EXPECT_EQ(components.Count(), 2U);
+  components.AddEdge({3, 4});
+  EXPECT_EQ(components.Largest(), 3U);
+  components.AddEdge({2, 4});
+  EXPECT_EQ(components.Count(), 2U);
+  components.AddEdge({0, 4});
+  EXPECT_EQ(components.Count(), 1U);
+  EXPECT_EQ(components.Largest(), 5U);
+  EXPECT_EQ(components.NumIsolated(), 1U);
+}
+
+// Vectors on a quarter circle: the distance of two vertices grows with the difference of their
+// numbers.
+Scene Fan(std::size_t num_vertices) {
+  Scene scene;
+  scene.num_vertices = num_vertices;
+  scene.vectors.resize(num_vertices * kDim);
+  for (std::size_t i = 0; i < num_vertices; ++i) {
+    const double angle =
+        1.5 * static_cast<double>(i * i) / static_cast<double>(num_vertices * num_vertices);
+    scene.vectors[i * kDim] = static_cast<float>(std::cos(angle));
+    scene.vectors[i * kDim + 1] = static_cast<float>(std::sin(angle));
+  }
+  return scene;
+}
+
+TEST(Sampling, ProposesTheNextUntestedOfTheRankedList) {
+  const Ranking ranking = MakeRanking(Fan(5));
+  ThreadPool threads(1);
+  GraphMatchOptions options;
+  Sampler sampler(options, ranking, threads);
+  MatchingGraph graph(5);
+  EXPECT_THAT(sampler.Propose(0, graph),
+              ElementsAre(VertexPair(0, 1), VertexPair(1, 2), VertexPair(2, 3), VertexPair(3, 4)));
+  graph.Add({{{0, 1}, false}, {{1, 2}, false}, {{2, 3}, false}, {{3, 4}, true}});
+  // 0 goes on to 2, 1 to 3, 2 to 0 (as 0 does), 3 to 1, 4 to 2.
+  EXPECT_THAT(sampler.Propose(1, graph),
+              ElementsAre(VertexPair(0, 2), VertexPair(1, 3), VertexPair(2, 4)));
+}
+
+TEST(Sampling, GoesOnBeyondTheKeptList) {
+  const Ranking ranking = MakeRanking(Fan(5), 1);
+  ThreadPool threads(1);
+  Sampler sampler(GraphMatchOptions(), ranking, threads);
+  MatchingGraph graph(5);
+  graph.Add({{{0, 1}, false}, {{1, 2}, false}, {{2, 3}, false}, {{3, 4}, true}});
+  EXPECT_THAT(sampler.Propose(1, graph),
+              ElementsAre(VertexPair(0, 2), VertexPair(1, 3), VertexPair(2, 4)));
+}
+
+TEST(Sampling, LeavesFullVerticesOut) {
+  const Ranking ranking = MakeRanking(Fan(4));
+  ThreadPool threads(1);
+  GraphMatchOptions options;
+  options.max_num_neighbors = 1;
+  Sampler sampler(options, ranking, threads);
+  MatchingGraph graph(4);
+  graph.Add({{{0, 1}, true}});
+  // 0 and 1 are full and propose nothing; 2 still proposes 1.
+  EXPECT_THAT(sampler.Propose(0, graph), ElementsAre(VertexPair(1, 2), VertexPair(2, 3)));
+}
+
+TEST(Sampling, StopsAtTheBudget) {
+  const Ranking ranking = MakeRanking(Fan(30));
+  ThreadPool threads(1);
+  GraphMatchOptions options;
+  options.max_tests_for_sampling = 3;
+  Sampler sampler(options, ranking, threads);
+  MatchingGraph graph(30);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_FALSE(sampler.Propose(i, graph).empty());
+    sampler.Charge();
+  }
+  EXPECT_THAT(sampler.Propose(3, graph), IsEmpty());
+}
+
+TEST(Propagation, ClosesTriangles) {
+  const Ranking ranking = MakeRanking(Fan(5));
+  ThreadPool threads(1);
+  MatchingGraph graph(5);
+  graph.Add({{{0, 1}, true}, {{1, 2}, true}, {{2, 3}, false}});
+  EXPECT_THAT(Propagate(GraphMatchOptions(), ranking, graph, 0, threads),
+              ElementsAre(VertexPair(0, 2)));
+  graph.Add({{{0, 2}, false}});
+  EXPECT_THAT(Propagate(GraphMatchOptions(), ranking, graph, 0, threads), IsEmpty());
+}
+
+TEST(Propagation, HandsOnTheNearestOnly) {
+  const Ranking ranking = MakeRanking(Fan(10));
+  ThreadPool threads(1);
+  MatchingGraph graph(10);
+  // 9 is a hub of 2 .. 8, and 0 knows it.
+  std::vector<TestedVertexPair> pairs = {{{0, 9}, true}};
+  for (Vertex v = 2; v < 9; ++v) pairs.push_back({{v, 9}, true});
+  graph.Add(pairs);
+  GraphMatchOptions options;
+  options.num_to_propagate = 2;
+  std::set<Vertex> of_zero;
+  for (const auto& [a, b] : Propagate(options, ranking, graph, 0, threads)) {
+    if (a == 0) of_zero.insert(b);
+  }
+  // 2 and 3 look most like 0; and 0 is the farthest for all others but 2 and 3, which have nearer
+  // ones.
+  EXPECT_THAT(of_zero, ElementsAre(2, 3));
+}
+
+TEST(Propagation, FullVerticesAreReachedFromOthersOnly) {
+  const Ranking ranking = MakeRanking(Fan(4));
+  ThreadPool threads(1);
+  GraphMatchOptions options;
+  options.max_num_neighbors = 1;
+  MatchingGraph graph(4);
+  graph.Add({{{0, 1}, true}, {{1, 2}, true}});
+  // All of 0, 1, 2 have a neighbour.
+  EXPECT_THAT(Propagate(options, ranking, graph, 0, threads), IsEmpty());
+  options.max_num_neighbors = 2;
+  EXPECT_THAT(Propagate(options, ranking, graph, 0, threads), ElementsAre(VertexPair(0, 2)));
+}
+
+struct NamedOptions {
+  std::string name;
+  GraphMatchOptions options;
+};
+
+std::vector<NamedOptions> AllChoices() {
+  std::vector<NamedOptions> choices = {{"Defaults", {}}};
+  const auto add = [&choices](const std::string& name, auto change) {
+    choices.push_back({name, {}});
+    change(choices.back().options);
+  };
+  using O = GraphMatchOptions;
+  add("Round", [](O& o) {
+    o.sampling_schedule = O::SamplingSchedule::kRound;
+    o.max_tests_for_sampling = 17;
+  });
+  add("Carry", [](O& o) {
+    o.sampling_schedule = O::SamplingSchedule::kCarry;
+    o.max_tests_for_sampling = 17;
+  });
+  add("CarryLittle", [](O& o) {
+    o.sampling_schedule = O::SamplingSchedule::kCarry;
+    o.max_tests_for_sampling = 3;
+  });
+  add("CountIncoming", [](O& o) { o.count_incoming_tests = true; });
+  add("RankByNeighbor", [](O& o) {
+    o.propagation_distance = O::PropagationDistance::kNeighbor;
+    o.num_to_propagate = 1;
+  });
+  add("DropTestedLate", [](O& o) { o.propagate_untested_only = false; });
+  add("NewEdgesOnly", [](O& o) {
+    o.propagate_from_new_edges_only = true;
+    o.num_to_propagate = 1;
+  });
+  add("StopSampling", [](O& o) { o.stop_sampling_without_edges = true; });
+  add("FewNeighbors", [](O& o) { o.max_num_neighbors = 3; });
+  add("NoSampling", [](O& o) { o.number_sample_iterations = 0; });
+  add("NoPropagation", [](O& o) { o.num_to_propagate = 0; });
+  add("ManySamples", [](O& o) { o.max_tests_for_sampling = 60; });
+  return choices;
+}
+
+class EveryChoice : public ::testing::TestWithParam<NamedOptions> {};
+
+TEST_P(EveryChoice, TestsTheSamePairsAsThePseudoCode) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const Scene scene = MakeScene(6, 14, 4, 0.6, seed);
+    const Ranking ranking = MakeRanking(scene);
+    RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
+    const GraphMatchResult result = RunLoop(GetParam().options, ranking, &verifier);
+    EXPECT_EQ(AsSets(verifier.batches), ReferenceBatches(GetParam().options, ranking, scene));
+    EXPECT_TRUE(result.finished);
+  }
+}
+
+TEST_P(EveryChoice, TestsNoPairTwiceAndKeepsTheDegreeLimit) {
+  const Scene scene = MakeScene(5, 20, 8, 0.8, 11);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  RecordingVerifier verifier(edges);
+  RunLoop(GetParam().options, MakeRanking(scene), &verifier);
+  std::set<ImagePair> seen;
+  std::map<ImageId, int> degrees;
+  for (const std::vector<ImagePair>& batch : verifier.batches) {
+    for (const ImagePair& pair : batch) {
+      EXPECT_TRUE(seen.insert(pair).second);
+      EXPECT_LT(std::min(degrees[pair.id1], degrees[pair.id2]),
+                GetParam().options.max_num_neighbors);
+    }
+    for (const ImagePair& pair : batch) {
+      if (edges.count(pair) == 0) continue;
+      ++degrees[pair.id1];
+      ++degrees[pair.id2];
+    }
+  }
+}
+
+TEST_P(EveryChoice, GivesOneResultForAnyNumberOfThreads) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 5);
+  const Ranking ranking = MakeRanking(scene);
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  RecordingVerifier one(edges);
+  RunLoop(GetParam().options, ranking, &one, 1);
+  for (const int num_threads : {2, 3, 8, 16}) {
+    RecordingVerifier many(edges);
+    RunLoop(GetParam().options, ranking, &many, num_threads);
+    EXPECT_EQ(many.batches, one.batches) << num_threads;
+  }
+}
+
+TEST_P(EveryChoice, GoesOnAfterAnInterruptionAsIfThereWasNone) {
+  const Scene scene = MakeScene(5, 12, 4, 0.7, 8);
+  const Ranking ranking = MakeRanking(scene);
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  RecordingVerifier undisturbed(edges);
+  const GraphMatchResult expected = RunLoop(GetParam().options, ranking, &undisturbed);
+  const std::set<ImagePair> all(undisturbed.tested.begin(), undisturbed.tested.end());
+  for (std::size_t stop = 0; stop <= all.size(); stop += 37) {
+    RecordingVerifier first(edges);
+    first.stop_after = stop;
+    EXPECT_EQ(RunLoop(GetParam().options, ranking, &first).finished, stop >= all.size());
+    RecordingVerifier second(edges);
+    second.known.insert(first.tested.begin(), first.tested.end());
+    const GraphMatchResult result = RunLoop(GetParam().options, ranking, &second);
+    std::set<ImagePair> both(first.tested.begin(), first.tested.end());
+    EXPECT_EQ(both.size(), first.tested.size());
+    for (const ImagePair& pair : second.tested) EXPECT_TRUE(both.insert(pair).second);
+    EXPECT_EQ(both, all) << stop;
+    EXPECT_EQ(result.graph.Edges(), expected.graph.Edges());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Loop, EveryChoice, ::testing::ValuesIn(AllChoices()),
+                         [](const auto& choice) { return choice.param.name; });
+
+TEST(Loop, FindsTheWholeGraphOfWellSeparatedPlaces) {
+  const Scene scene = MakeScene(12, 20, 5, 0.25, 3);
+  RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  EXPECT_EQ(result.graph.NumEdges(), scene.edges.size());
+  EXPECT_EQ(result.num_components, 12U);
+  EXPECT_EQ(result.largest_component, 20U);
+  EXPECT_EQ(result.num_isolated, 0U);
+  const StageStatistics all = result.sampling + result.propagation;
+  EXPECT_EQ(all.num_edges, scene.edges.size());
+  EXPECT_EQ(all.num_tested, verifier.tested.size());
+  // Every pair within a place may be worth a test, and sampling tests some between places.
+  EXPECT_LT(all.num_tested, 12U * 190U + 240U * 10U);
+}
+
+TEST(Loop, StatisticsOfIterationsAddUp) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 2);
+  RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  StageStatistics sampling;
+  StageStatistics propagation;
+  for (const IterationStatistics& iteration : result.iterations) {
+    sampling = sampling + iteration.sampling;
+    propagation = propagation + iteration.propagation;
+  }
+  EXPECT_EQ(sampling.num_tested, result.sampling.num_tested);
+  EXPECT_EQ(propagation.num_tested, result.propagation.num_tested);
+  EXPECT_EQ(sampling.num_edges + propagation.num_edges, result.graph.NumEdges());
+  EXPECT_EQ(result.graph.NumTested(), verifier.tested.size());
+}
+
+TEST(Loop, TerminatesOnACompleteGraph) {
+  Scene scene = MakeScene(1, 60, 60, 0.5, 4);
+  RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  EXPECT_EQ(result.graph.NumEdges(), 60U * 59U / 2U);
+}
+
+TEST(Loop, TerminatesWithoutAnyEdge) {
+  const Scene scene = MakeScene(4, 10, 0, 0.5, 4);
+  RecordingVerifier verifier({});
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  EXPECT_EQ(result.graph.NumEdges(), 0U);
+  EXPECT_EQ(result.num_isolated, 40U);
+  EXPECT_EQ(result.iterations.size(), 10U);
+}
+
+TEST(Loop, HandlesNoneOneAndTwoImages) {
+  for (const int num : {0, 1, 2}) {
+    const Scene scene = MakeScene(1, num, 1, 0.1, 6);
+    RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
+    const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+    EXPECT_EQ(result.graph.NumEdges(), num == 2 ? 1U : 0U);
+    EXPECT_TRUE(result.finished);
+  }
+}
+
+TEST(Loop, EdgesOfOtherMatchersSeedTheGraph) {
+  const Scene scene = MakeScene(4, 12, 11, 0.4, 9);
+  const Ranking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  RecordingVerifier verifier(edges);
+  // A chain through the first place, as a sequential matcher finds it, and a failed pair between
+  // places.
+  for (std::size_t i = 0; i + 1 < 12; ++i) verifier.known.emplace(ids[i], ids[i + 1]);
+  verifier.known.emplace(ids[0], ids[20]);
+  GraphMatchOptions options;
+  options.number_sample_iterations = 0;
+  const GraphMatchResult result = RunLoop(options, ranking, &verifier);
+  // Propagation along the chain alone finds the rest of the place, and nothing of it is tested
+  // again.
+  EXPECT_EQ(result.graph.NumEdges(), 12U * 11U / 2U);
+  EXPECT_EQ(result.num_seed_edges, 11U);
+  EXPECT_EQ(result.num_seed_pairs, 12U);
+  EXPECT_EQ(result.propagation.num_tested, 12U * 11U / 2U - 11U);
+  for (const ImagePair& pair : verifier.tested) EXPECT_EQ(verifier.known.count(pair), 0U);
+}
+
+TEST(Loop, SeedsCountTowardsTheDegreeBeforeTheFirstSample) {
+  const Scene scene = MakeScene(2, 10, 9, 0.4, 9);
+  const Ranking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  // Edges of the first image that sampling would not draw: to the images that look least like it.
+  std::set<ImagePair> edges = ImageEdges(scene, ids);
+  const std::vector<Vertex> farthest = ranking.AllOf(0);
+  std::set<ImagePair> known;
+  for (std::size_t i = 1; i <= 4; ++i) known.emplace(ids[0], ids[farthest[farthest.size() - i]]);
+  edges.insert(known.begin(), known.end());
+  RecordingVerifier verifier(edges);
+  verifier.known = known;
+  GraphMatchOptions options;
+  options.max_num_neighbors = 4;
+  options.num_to_propagate = 0;
+  options.max_tests_for_sampling = 1;
+  RunLoop(options, ranking, &verifier);
+  ASSERT_THAT(verifier.batches, SizeIs(1));
+  // The first image is full: it is tested with those alone that draw it themselves.
+  for (const ImagePair& pair : verifier.batches.front()) {
+    if (pair.id1 != ids[0]) continue;
+    const auto other =
+        static_cast<Vertex>(std::find(ids.begin(), ids.end(), pair.id2) - ids.begin());
+    EXPECT_EQ(ranking.NearestOf(other).front(), 0U);
+  }
+  const Vertex nearest = ranking.NearestOf(0).front();
+  ASSERT_NE(ranking.NearestOf(nearest).front(), 0U) << "the scene does not show the difference";
+}
+
+TEST(Loop, SecondRunTestsNothing) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 21);
+  const Ranking ranking = MakeRanking(scene);
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  RecordingVerifier first(edges);
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), ranking, &first);
+  RecordingVerifier second(edges);
+  second.known.insert(first.tested.begin(), first.tested.end());
+  const GraphMatchResult again = RunLoop(GraphMatchOptions(), ranking, &second);
+  EXPECT_THAT(second.tested, IsEmpty());
+  EXPECT_EQ(again.graph.Edges(), result.graph.Edges());
+  EXPECT_EQ((again.sampling + again.propagation).num_known, first.tested.size());
+  EXPECT_EQ(again.num_seed_pairs, 0U);
+}
+
+TEST(Loop, APairThatFailedIsTheOnlyOneThatTheNextRunTests) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 21);
+  const Ranking ranking = MakeRanking(scene);
+  std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  RecordingVerifier probe(edges);
+  RunLoop(GraphMatchOptions(), ranking, &probe);
+  // One that is no edge: the path of the first run stays right when it is tested at last.
+  ImagePair bad;
+  for (const ImagePair& pair : probe.batches.front()) {
+    if (edges.count(pair) == 0) bad = pair;
+  }
+  ASSERT_NE(bad.id1, 0U);
+  RecordingVerifier first(edges);
+  first.failing = {bad};
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), ranking, &first);
+  EXPECT_THAT(result.failed_pairs, ElementsAre(bad));
+  RecordingVerifier second(edges);
+  second.known.insert(first.tested.begin(), first.tested.end());
+  second.known.erase(bad);
+  const GraphMatchResult again = RunLoop(GraphMatchOptions(), ranking, &second);
+  EXPECT_THAT(second.tested, ElementsAre(bad));
+  EXPECT_EQ(again.num_seed_pairs, 0U);
+  EXPECT_EQ(again.graph.Edges(), result.graph.Edges());
+}
+
+TEST(Loop, RepeatedAfterOtherMatchersItTestsHardlyAnything) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 22);
+  const Ranking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  RecordingVerifier first(edges);
+  for (std::size_t i = 0; i + 5 < ids.size(); ++i) first.known.emplace(ids[i], ids[i + 5]);
+  RunLoop(GraphMatchOptions(), ranking, &first);
+  RecordingVerifier second(edges);
+  second.known = first.known;
+  second.known.insert(first.tested.begin(), first.tested.end());
+  RunLoop(GraphMatchOptions(), ranking, &second);
+  EXPECT_LT(second.tested.size(), first.tested.size() / 20);
+}
+
+TEST(Loop, NewImagesAreSampledAndOldOnesHardly) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 23);
+  const Ranking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  RecordingVerifier whole(edges);
+  RunLoop(GraphMatchOptions(), ranking, &whole);
+  // Two images of the third place are new: nothing of them was tested.
+  const std::set<ImageId> added = {ids[30], ids[35]};
+  RecordingVerifier second(edges);
+  for (const ImagePair& pair : whole.tested) {
+    if (added.count(pair.id1) + added.count(pair.id2) == 0) second.known.insert(pair);
+  }
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), ranking, &second);
+  std::size_t of_old_images = 0;
+  for (const ImagePair& pair : second.tested) {
+    of_old_images += added.count(pair.id1) + added.count(pair.id2) == 0 ? 1U : 0U;
+  }
+  EXPECT_LT(of_old_images, second.tested.size());
+  EXPECT_LT(second.tested.size(), whole.tested.size() / 4);
+  EXPECT_GT(result.graph.Degree(30), 0U);
+  EXPECT_GT(result.graph.Degree(35), 0U);
+}
+
+TEST(Loop, PairsThatCannotBeTestedAreReportedOnceAndAreNoEdges) {
+  const Scene scene = MakeScene(3, 10, 9, 0.3, 13);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  const ImagePair bad(ids[0], ids[1]);
+  verifier.failing = {bad};
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  EXPECT_THAT(result.failed_pairs, ElementsAre(bad));
+  EXPECT_EQ(std::count(verifier.tested.begin(), verifier.tested.end(), bad), 1);
+  EXPECT_EQ(result.graph.NumEdges(), scene.edges.size() - 1);
+  EXPECT_EQ((result.sampling + result.propagation).num_failed, 1U);
+}
+
+TEST(Loop, KnownPairsOfUnrankedImagesAreLeftAside) {
+  const Scene scene = MakeScene(2, 6, 2, 0.3, 14);
+  RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
+  verifier.known = {ImagePair(1, 2), ImagePair(7, 8), ImagePair(1000, 2000), ImagePair(10, 10)};
+  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  EXPECT_EQ(result.num_seed_pairs, 0U);
+  EXPECT_TRUE(result.finished);
+}
+
+TEST(Loop, ProgressGrowsAndEndsAtTheResult) {
+  const Scene scene = MakeScene(5, 12, 4, 0.5, 15);
+  const Ranking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  ThreadPool threads(2);
+  LoopProgress last;
+  std::size_t calls = 0;
+  const GraphMatchResult result = RunGraphMatch(
+      GraphMatchOptions(), ranking, ids, verifier, threads, [&](const LoopProgress& progress) {
+        EXPECT_GE(progress.num_edges, last.num_edges);
+        EXPECT_EQ((progress.sampling + progress.propagation).num_tested, calls + 1);
+        last = progress;
+        ++calls;
+      });
+  EXPECT_EQ(calls, verifier.tested.size());
+  EXPECT_EQ(last.num_edges, result.graph.NumEdges());
+  EXPECT_EQ(last.num_components, result.num_components);
+  EXPECT_EQ(last.num_isolated, result.num_isolated);
+}
+
+TEST(Loop, NeedsAnIdForEveryImage) {
+  const Scene scene = MakeScene(1, 4, 1, 0.3, 1);
+  const Ranking ranking = MakeRanking(scene);
+  RecordingVerifier verifier({});
+  ThreadPool threads(1);
+  EXPECT_THROW(RunGraphMatch({}, ranking, {1, 2}, verifier, threads, nullptr), OptionsError);
+  EXPECT_THROW(RunGraphMatch({}, ranking, {4, 3, 2, 1}, verifier, threads, nullptr), OptionsError);
+}
+
+TEST(ReplayVerifier, AnswersFromTheGraph) {
+  ReplayVerifier verifier({{ImagePair(1, 2), 30}});
+  verifier.SetKnownPairs({ImagePair(1, 3), ImagePair(2, 1)});
+  const std::vector<VerifiedPair>& known = verifier.KnownPairs();
+  ASSERT_EQ(known.size(), 2U);
+  EXPECT_EQ(known[0].outcome, PairOutcome::kEdge);
+  EXPECT_EQ(known[0].num_inliers, 30U);
+  EXPECT_EQ(known[1].outcome, PairOutcome::kNoEdge);
+  std::vector<PairOutcome> outcomes;
+  EXPECT_TRUE(verifier.Verify({ImagePair(1, 2), ImagePair(2, 3)},
+                              [&](const VerifiedPair& pair) { outcomes.push_back(pair.outcome); }));
+  EXPECT_THAT(outcomes, ElementsAre(PairOutcome::kEdge, PairOutcome::kNoEdge));
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch

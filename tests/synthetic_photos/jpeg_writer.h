@@ -1,0 +1,16 @@
+#ifndef TESTS_SYNTHETIC_PHOTOS_JPEG_WRITER_H_
+#define TESTS_SYNTHETIC_PHOTOS_JPEG_WRITER_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace colmap_graphmatch::synthetic {
+
+// Writes rows of RGB bytes. Throws std::runtime_error if the file cannot be written.
+void WriteJpeg(const std::string& path, int width, int height, int quality,
+               const std::vector<uint8_t>& rgb);
+
+}  // namespace colmap_graphmatch::synthetic
+
+#endif  // TESTS_SYNTHETIC_PHOTOS_JPEG_WRITER_H_

@@ -1,0 +1,385 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/verification/colmap_installation.h"
+#include "colmap_graphmatch/verification/colmap_verifier.h"
+#include "colmap_graphmatch/verification/subprocess.h"
+#include "colmap_graphmatch/verification/work_directory.h"
+#include "tests/support/synthetic_database.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+bool Never() { return false; }
+
+// The verifier on a small database with the test double of COLMAP in place of COLMAP.
+class VerifierTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (const char* name :
+         {"FAKE_COLMAP_VERSION", "FAKE_COLMAP_SCHEMA", "FAKE_COLMAP_GROUP", "FAKE_COLMAP_FAULT",
+          "FAKE_COLMAP_FAULT_PAIR", "FAKE_COLMAP_FAULT_IMAGE", "FAKE_COLMAP_FAULT_TIMES",
+          "FAKE_COLMAP_DELAY_MS"}) {
+      ::unsetenv(name);
+    }
+    Set("FAKE_COLMAP_LOG", (directory_.Path() / "log.txt").string());
+    database_path_ = directory_.Path() / "data base.db";
+    WriteSyntheticDatabase(database_path_, Schema::kColmap38, MakePlaces(5, 5, 30, 1));
+    options_.num_threads = 2;
+    options_.lock_timeout = 5;
+  }
+
+  static void Set(const std::string& name, const std::string& value) {
+    ::setenv(name.c_str(), value.c_str(), 1);
+  }
+
+  // Verifies the pairs; false if the verifier left some out.
+  bool Verify(const std::vector<ImagePair>& pairs) {
+    Database database(database_path_, sqlite::Access::kReadWrite, 5);
+    const WorkDirectory work(directory_.Path());
+    const ColmapInstallation colmap = DetectColmap(FAKE_COLMAP_PATH, work.Path(), stop_);
+    ColmapVerifier verifier(options_, colmap, database, database.ReadImages(), work.Path(), stop_,
+                            [this](const std::string& warning) { warnings_.push_back(warning); });
+    const bool complete = verifier.Verify(pairs, [this](const VerifiedPair& pair) {
+      EXPECT_TRUE(outcomes_.emplace(pair.pair, pair.outcome).second);
+    });
+    EXPECT_THAT(ShardDirectories(work.Path()), IsEmpty());
+    return complete;
+  }
+
+  static std::vector<std::string> ShardDirectories(const std::filesystem::path& path) {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(path)) {
+      if (entry.is_directory()) names.push_back(entry.path().string());
+    }
+    return names;
+  }
+
+  std::set<ImagePair> InDatabase() const {
+    Database database(database_path_, sqlite::Access::kRead, 5);
+    std::set<ImagePair> pairs;
+    for (const TestedPair& tested : database.ReadTestedPairs()) pairs.insert(tested.pair);
+    return pairs;
+  }
+
+  std::vector<std::string> Log() const {
+    std::ifstream file(directory_.Path() / "log.txt");
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(file, line);) lines.push_back(line);
+    return lines;
+  }
+
+  std::size_t CountInLog(const std::string& beginning) const {
+    std::size_t count = 0;
+    for (const std::string& line : Log()) count += line.rfind(beginning, 0) == 0 ? 1U : 0U;
+    return count;
+  }
+
+  TestDirectory directory_;
+  std::filesystem::path database_path_;
+  ColmapVerifierOptions options_;
+  StopRequest stop_;
+  std::map<ImagePair, PairOutcome> outcomes_;
+  std::vector<std::string> warnings_;
+};
+
+std::vector<ImagePair> AllPairs(ImageId num_images) {
+  std::vector<ImagePair> pairs;
+  for (ImageId a = 1; a <= num_images; ++a) {
+    for (ImageId b = a + 1; b <= num_images; ++b) pairs.emplace_back(a, b);
+  }
+  return pairs;
+}
+
+// What the test double calls an edge.
+bool IsFakeEdge(const ImagePair& pair) { return pair.id1 / 10 == pair.id2 / 10; }
+
+TEST_F(VerifierTest, VerifiesEveryPairAndWritesItToTheDatabase) {
+  const std::vector<ImagePair> pairs = AllPairs(25);
+  EXPECT_TRUE(Verify(pairs));
+  ASSERT_THAT(outcomes_, SizeIs(300));
+  for (const auto& [pair, outcome] : outcomes_) {
+    EXPECT_EQ(outcome, IsFakeEdge(pair) ? PairOutcome::kEdge : PairOutcome::kNoEdge);
+  }
+  EXPECT_EQ(InDatabase(), std::set<ImagePair>(pairs.begin(), pairs.end()));
+  EXPECT_EQ(CountInLog("pair"), 300U);
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(VerifierTest, KnownPairsAreAnsweredWithoutColmap) {
+  EXPECT_TRUE(Verify(AllPairs(10)));
+  const std::size_t pairs_before = CountInLog("pair");
+  outcomes_.clear();
+  EXPECT_TRUE(Verify(AllPairs(12)));
+  EXPECT_THAT(outcomes_, SizeIs(66));
+  EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kEdge);
+  EXPECT_EQ(CountInLog("pair"), pairs_before + 66 - 45);
+}
+
+TEST_F(VerifierTest, ShardsDoNotDependOnTheNumberOfProcesses) {
+  const auto runs = [this](int num_processes) {
+    std::filesystem::remove(directory_.Path() / "log.txt");
+    sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
+        .Execute("DELETE FROM two_view_geometries");
+    sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
+        .Execute("DELETE FROM matches");
+    options_.num_processes = num_processes;
+    outcomes_.clear();
+    Verify(AllPairs(20));
+    return CountInLog("run");
+  };
+  const std::size_t one = runs(1);
+  EXPECT_GT(one, 10U);
+  EXPECT_EQ(runs(2), one);
+  EXPECT_EQ(runs(7), one);
+}
+
+class Fault : public VerifierTest, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(Fault, OnOnePairLosesThatPairAlone) {
+  Set("FAKE_COLMAP_FAULT", GetParam());
+  Set("FAKE_COLMAP_FAULT_PAIR", "3 7");
+  options_.timeout_per_pair = 0.5;
+  EXPECT_TRUE(Verify(AllPairs(15)));
+  ASSERT_THAT(outcomes_, SizeIs(105));
+  for (const auto& [pair, outcome] : outcomes_) {
+    EXPECT_EQ(outcome, pair == ImagePair(3, 7) ? PairOutcome::kFailed
+                       : IsFakeEdge(pair)      ? PairOutcome::kEdge
+                                               : PairOutcome::kNoEdge);
+  }
+  EXPECT_EQ(InDatabase().count(ImagePair(3, 7)), 0U);
+  EXPECT_THAT(InDatabase(), SizeIs(104));
+  // The user learns the names that the images have in the database, and COLMAP's last words.
+  EXPECT_THAT(warnings_,
+              ElementsAre(AllOf(HasSubstr("\"place0/photo 2.jpg\" and \"place1/photo 1.jpg\""),
+                                HasSubstr("a made-up fault on the pair 3 7"))));
+  // Another run tries the pair again, and it alone.
+  ::unsetenv("FAKE_COLMAP_FAULT");
+  const std::size_t pairs_before = CountInLog("pair");
+  outcomes_.clear();
+  EXPECT_TRUE(Verify(AllPairs(15)));
+  EXPECT_EQ(CountInLog("pair"), pairs_before + 1);
+  EXPECT_EQ(outcomes_.at(ImagePair(3, 7)), PairOutcome::kEdge);
+}
+
+INSTANTIATE_TEST_SUITE_P(Colmap, Fault,
+                         ::testing::Values("crash", "exit", "hang", "nothing", "nonsense",
+                                           "short"));
+
+TEST_F(VerifierTest, AFaultThatPassesCostsNothing) {
+  Set("FAKE_COLMAP_FAULT", "crash");
+  Set("FAKE_COLMAP_FAULT_PAIR", "3 7");
+  Set("FAKE_COLMAP_FAULT_TIMES", "1");
+  EXPECT_TRUE(Verify(AllPairs(15)));
+  EXPECT_THAT(InDatabase(), SizeIs(105));
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(VerifierTest, OneBadImageLosesItsPairsAlone) {
+  Set("FAKE_COLMAP_FAULT", "crash");
+  Set("FAKE_COLMAP_FAULT_IMAGE", "3");
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  EXPECT_THAT(InDatabase(), SizeIs(300 - 24));
+  EXPECT_THAT(warnings_, SizeIs(24));
+}
+
+TEST_F(VerifierTest, GivesUpWhenColmapFailsOnEverything) {
+  Set("FAKE_COLMAP_FAULT", "exit");
+  Set("FAKE_COLMAP_FAULT_PAIR", "all");
+  try {
+    Verify(AllPairs(15));
+    FAIL();
+  } catch (const ColmapError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("fails on every pair"), HasSubstr("exit code 1"),
+                                    HasSubstr("a made-up fault")));
+  }
+  EXPECT_THAT(InDatabase(), IsEmpty());
+}
+
+TEST_F(VerifierTest, StopsAfterTheShardsUnderWay) {
+  Set("FAKE_COLMAP_DELAY_MS", "20");
+  std::thread stopper([this] {
+    while (CountInLog("pair") < 20) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    stop_.Raise();
+  });
+  EXPECT_FALSE(Verify(AllPairs(25)));
+  stopper.join();
+  // All that COLMAP did is kept.
+  EXPECT_EQ(InDatabase().size(), CountInLog("pair"));
+  EXPECT_EQ(outcomes_.size(), InDatabase().size());
+  EXPECT_LT(outcomes_.size(), 300U);
+}
+
+TEST_F(VerifierTest, AbandonsShardsWhenAskedTwice) {
+  Set("FAKE_COLMAP_FAULT", "hang");
+  Set("FAKE_COLMAP_FAULT_PAIR", "all");
+  std::thread stopper([this] {
+    while (CountInLog("fault") < 2) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    stop_.Raise();
+    stop_.Raise();
+  });
+  EXPECT_FALSE(Verify(AllPairs(25)));
+  stopper.join();
+  EXPECT_THAT(InDatabase(), IsEmpty());
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(VerifierTest, OptionsAreSpeltAsTheInstalledColmapSpellsThem) {
+  Set("FAKE_COLMAP_VERSION", "COLMAP 4.2.1 (Commit x on y without GPU support)");
+  Set("FAKE_COLMAP_SCHEMA", "42");
+  Set("FAKE_COLMAP_GROUP", "FeatureMatching");
+  options_.colmap_options = {{"max_ratio", "0.7"}, {"max_error", "3"}};
+  options_.min_num_inliers = 18;
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("--FeatureMatching.max_ratio=0.7"),
+                                    HasSubstr("--FeatureMatching.use_gpu=0"),
+                                    HasSubstr("--FeatureMatching.num_threads=1"),
+                                    HasSubstr("--FeatureMatching.min_num_inliers=18"))));
+  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("COLMAP 4.2.1 has no option max_error")));
+}
+
+TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {
+  Set("FAKE_COLMAP_VERSION", "COLMAP 3.10\n(Commit x on y with CUDA)");
+  Set("FAKE_COLMAP_SCHEMA", "310");
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("use_gpu=1"), HasSubstr("num_threads=2"))));
+  options_.use_gpu = false;
+  outcomes_.clear();
+  EXPECT_TRUE(Verify({ImagePair(1, 3)}));
+  EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("use_gpu=0"), HasSubstr("num_threads=1"))));
+}
+
+TEST_F(VerifierTest, EdgesFollowMinNumInliers) {
+  options_.min_num_inliers = 21;  // The test double finds 20.
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kNoEdge);
+}
+
+class DetectTest : public VerifierTest {
+ protected:
+  std::string MessageOf(const std::string& colmap_path) const {
+    try {
+      DetectColmap(colmap_path, directory_.Path(), stop_);
+    } catch (const ColmapError& error) {
+      return error.what();
+    }
+    return "";
+  }
+};
+
+TEST_F(DetectTest, ReadsTheVersionAndTheGpu) {
+  const auto detect = [this](const std::string& text) {
+    Set("FAKE_COLMAP_VERSION", text);
+    return DetectColmap(FAKE_COLMAP_PATH, directory_.Path(), stop_);
+  };
+  const ColmapInstallation old =
+      detect("COLMAP 3.8 -- Structure-from-Motion\n(Commit a on b without CUDA)");
+  EXPECT_EQ(old.Version(), "3.8");
+  EXPECT_FALSE(old.has_gpu);
+  EXPECT_TRUE(detect("COLMAP 3.10-dev -- x\n(Commit a on b with CUDA)").has_gpu);
+  const ColmapInstallation recent = detect("COLMAP 4.2.1 (Commit a on b with GPU support, std)");
+  EXPECT_EQ(recent.Version(), "4.2.1");
+  EXPECT_TRUE(recent.has_gpu);
+  EXPECT_FALSE(detect("COLMAP 4.2.1 (Commit a on b without GPU support)").has_gpu);
+}
+
+TEST_F(DetectTest, MissingProgram) {
+  EXPECT_THAT(
+      MessageOf("no-such-colmap"),
+      AllOf(HasSubstr("no program \"no-such-colmap\" on the PATH"), HasSubstr("--colmap_path")));
+  EXPECT_THAT(MessageOf("/nowhere/colmap"), HasSubstr("no program at /nowhere/colmap"));
+}
+
+TEST_F(DetectTest, NotColmap) {
+  EXPECT_THAT(MessageOf("/bin/echo"), HasSubstr("is not COLMAP"));
+  EXPECT_THAT(MessageOf("/bin/false"), HasSubstr("ended with exit code 1"));
+}
+
+TEST_F(DetectTest, TooOld) {
+  Set("FAKE_COLMAP_VERSION", "COLMAP 3.7 -- x\n(without CUDA)");
+  EXPECT_THAT(MessageOf(FAKE_COLMAP_PATH),
+              AllOf(HasSubstr("is COLMAP 3.7"), HasSubstr("3.8 or later")));
+}
+
+TEST(Subprocess, ReportsHowItEnded) {
+  const TestDirectory directory;
+  const auto run = [&](const std::string& script, double timeout = 0) {
+    return RunSubprocess({"/bin/sh", "-c", script}, directory.Path() / "out.txt", timeout, Never);
+  };
+  EXPECT_TRUE(run("echo to stdout; echo to stderr >&2").Succeeded());
+  EXPECT_EQ(LastLines(directory.Path() / "out.txt", 9), "to stdout\nto stderr");
+  EXPECT_EQ(LastLines(directory.Path() / "out.txt", 1), "to stderr");
+  EXPECT_EQ(run("exit 7").exit_code, 7);
+  const SubprocessResult killed = run("kill -ABRT $$");
+  EXPECT_EQ(killed.ending, SubprocessResult::Ending::kSignal);
+  EXPECT_EQ(killed.signal, SIGABRT);
+  EXPECT_THAT(killed.Describe(), HasSubstr("signal 6"));
+  // What it started dies with it.
+  const SubprocessResult hanging = run("sleep 1000 & echo $!; wait", 0.5);
+  EXPECT_EQ(hanging.ending, SubprocessResult::Ending::kTimedOut);
+  const pid_t grandchild = std::stoi(LastLines(directory.Path() / "out.txt", 1));
+  // A signal is sent, not awaited, and whoever inherits the dead takes its time to bury them. Were
+  // it not killed, this would last until the test's own time limit.
+  const auto lives = [&] {
+    std::string pid, name, state = "Z";
+    std::ifstream("/proc/" + std::to_string(grandchild) + "/stat") >> pid >> name >> state;
+    return state != "Z" && state != "X";
+  };
+  while (lives()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+}
+
+TEST(Subprocess, CanBeStopped) {
+  const TestDirectory directory;
+  std::atomic<int> polls{0};
+  const SubprocessResult result = RunSubprocess({"/bin/sleep", "100"}, directory.Path() / "out.txt",
+                                                0, [&] { return ++polls > 3; });
+  EXPECT_EQ(result.ending, SubprocessResult::Ending::kStopped);
+}
+
+TEST(Subprocess, ThatCannotStart) {
+  const TestDirectory directory;
+  EXPECT_THROW(RunSubprocess({"/nowhere/program"}, directory.Path() / "out.txt", 0, Never),
+               ColmapError);
+}
+
+TEST(Subprocess, ArgumentsReachNoShell) {
+  const TestDirectory directory;
+  RunSubprocess({"/bin/echo", "$(touch x); `id` 'a b'"}, directory.Path() / "out.txt", 0, Never);
+  EXPECT_EQ(LastLines(directory.Path() / "out.txt", 1), "$(touch x); `id` 'a b'");
+}
+
+TEST(WorkDirectory, IsPrivateAndGoesAway) {
+  const TestDirectory directory;
+  std::filesystem::path path;
+  {
+    const WorkDirectory work(directory.Path());
+    path = work.Path();
+    EXPECT_EQ(std::filesystem::status(path).permissions(), std::filesystem::perms::owner_all);
+    std::ofstream(path / "file") << "x";
+  }
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_THROW(WorkDirectory("/nowhere"), FileError);
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch
