@@ -10,6 +10,7 @@
 #include <initializer_list>
 #include <limits>
 #include <mutex>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/largest_scales.h"
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
@@ -29,6 +31,7 @@ namespace {
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 constexpr ImageId kLargestId = 2147483646;
 
@@ -380,6 +383,47 @@ TEST(StopRequestTest, NoRaiseIsLostWhenTwoThreadsRaise) {
   raise_all();
   other.join();
   for (const StopRequest& stop : stops) ASSERT_TRUE(stop.Abandon());
+}
+
+TEST(SelectLargestScalesTest, ReturnsTheRowsOfTheLargestScalesAscending) {
+  EXPECT_THAT(SelectLargestScales({5, 1, 9, 3, 7, 2}, 3), ElementsAre(0, 2, 4));
+  EXPECT_THAT(SelectLargestScales({1, 2, 3, 4}, 1), ElementsAre(3));
+}
+
+TEST(SelectLargestScalesTest, ReturnsAllRowsIfThereAreNoMore) {
+  EXPECT_THAT(SelectLargestScales({3, 1, 2}, 3), ElementsAre(0, 1, 2));
+  EXPECT_THAT(SelectLargestScales({3, 1, 2}, 100), ElementsAre(0, 1, 2));
+  EXPECT_THAT(SelectLargestScales({}, 3), IsEmpty());
+  EXPECT_THAT(SelectLargestScales({3, 1, 2}, 0), IsEmpty());
+}
+
+TEST(SelectLargestScalesTest, PrefersTheFirstOfEqualScales) {
+  EXPECT_THAT(SelectLargestScales({2, 5, 2, 2, 7, 2}, 4), ElementsAre(0, 1, 2, 4));
+  const std::vector<std::size_t> rows = SelectLargestScales(std::vector<float>(1000, 3), 100);
+  std::vector<std::size_t> expected(100);
+  std::iota(expected.begin(), expected.end(), std::size_t{0});
+  EXPECT_EQ(rows, expected);
+}
+
+TEST(SelectLargestScalesTest, TakesNaNAsZero) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(SelectLargestScales({nan, 1, nan, 2, nan, 0.5F}, 3), ElementsAre(1, 3, 5));
+  EXPECT_THAT(SelectLargestScales({1, 0, nan, 0, nan}, 3), ElementsAre(0, 1, 2));
+  EXPECT_THAT(SelectLargestScales({nan, 0, 1}, 2), ElementsAre(0, 2));
+  EXPECT_THAT(SelectLargestScales({nan, 0, nan, nan, 0, 0}, 3), ElementsAre(0, 1, 2));
+}
+
+TEST(SelectLargestScalesTest, AgreesWithSortingForManyScales) {
+  Random random({44});
+  std::vector<float> scales(2000);
+  for (float& scale : scales) scale = static_cast<float>(random.Index(50));
+  std::vector<std::size_t> expected(scales.size());
+  std::iota(expected.begin(), expected.end(), std::size_t{0});
+  std::stable_sort(expected.begin(), expected.end(),
+                   [&](std::size_t a, std::size_t b) { return scales[a] > scales[b]; });
+  expected.resize(777);
+  std::sort(expected.begin(), expected.end());
+  EXPECT_EQ(SelectLargestScales(scales, 777), expected);
 }
 
 }  // namespace

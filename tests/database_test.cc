@@ -406,7 +406,7 @@ TEST_P(ShardTest, HoldsTheImagesOfItsPairs) {
           ", 1, 2, zeroblob(8))");
   const std::filesystem::path shard_path = directory_.Path() / "shard.db";
   CreateColmapDatabase(shard_path, GetParam().target);
-  FillShard(shard_path, Path(), kLockTimeout, {ImagePair(2, 5), ImagePair(3, 5)});
+  FillShard(shard_path, Path(), kLockTimeout, {{ImagePair(2, 5), {}}, {ImagePair(3, 5), {}}}, true);
 
   sqlite::Connection shard(shard_path, sqlite::Access::kRead, 1);
   sqlite::Statement images(shard, "SELECT image_id, name FROM images ORDER BY image_id");
@@ -440,7 +440,7 @@ INSTANTIATE_TEST_SUITE_P(AcrossVersions, ShardTest,
 class ShardResults : public DatabaseTest {
  protected:
   std::vector<PairRows> Read() const {
-    return ReadShard(Path(), {ImagePair(1, 2)}, {{1, 10}, {2, 10}});
+    return ReadShard(Path(), {{ImagePair(1, 2), {}}}, {{1, 10}, {2, 10}});
   }
   void Result(const std::string& match_values, const std::string& geometry_values) const {
     const std::string id = std::to_string(EncodePair(ImagePair(1, 2)));

@@ -299,47 +299,6 @@ TEST(FisherVectorTest, ImagesOfTheSamePlaceAreNearerThanImagesOfDifferentOnes) {
   EXPECT_LT(farthest_same_place, nearest_other_place);
 }
 
-TEST(SelectLargestScalesTest, ReturnsTheRowsOfTheLargestScalesAscending) {
-  EXPECT_THAT(SelectLargestScales({5, 1, 9, 3, 7, 2}, 3), ElementsAre(0, 2, 4));
-  EXPECT_THAT(SelectLargestScales({1, 2, 3, 4}, 1), ElementsAre(3));
-}
-
-TEST(SelectLargestScalesTest, ReturnsAllRowsIfThereAreNoMore) {
-  EXPECT_THAT(SelectLargestScales({3, 1, 2}, 3), ElementsAre(0, 1, 2));
-  EXPECT_THAT(SelectLargestScales({3, 1, 2}, 100), ElementsAre(0, 1, 2));
-  EXPECT_THAT(SelectLargestScales({}, 3), IsEmpty());
-  EXPECT_THAT(SelectLargestScales({3, 1, 2}, 0), IsEmpty());
-}
-
-TEST(SelectLargestScalesTest, PrefersTheFirstOfEqualScales) {
-  EXPECT_THAT(SelectLargestScales({2, 5, 2, 2, 7, 2}, 4), ElementsAre(0, 1, 2, 4));
-  const std::vector<std::size_t> rows = SelectLargestScales(std::vector<float>(1000, 3), 100);
-  std::vector<std::size_t> expected(100);
-  std::iota(expected.begin(), expected.end(), std::size_t{0});
-  EXPECT_EQ(rows, expected);
-}
-
-TEST(SelectLargestScalesTest, TakesNaNAsZero) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(SelectLargestScales({nan, 1, nan, 2, nan, 0.5F}, 3), ElementsAre(1, 3, 5));
-  EXPECT_THAT(SelectLargestScales({1, 0, nan, 0, nan}, 3), ElementsAre(0, 1, 2));
-  EXPECT_THAT(SelectLargestScales({nan, 0, 1}, 2), ElementsAre(0, 2));
-  EXPECT_THAT(SelectLargestScales({nan, 0, nan, nan, 0, 0}, 3), ElementsAre(0, 1, 2));
-}
-
-TEST(SelectLargestScalesTest, AgreesWithSortingForManyScales) {
-  Random random({44});
-  std::vector<float> scales(2000);
-  for (float& scale : scales) scale = static_cast<float>(random.Index(50));
-  std::vector<std::size_t> expected(scales.size());
-  std::iota(expected.begin(), expected.end(), std::size_t{0});
-  std::stable_sort(expected.begin(), expected.end(),
-                   [&](std::size_t a, std::size_t b) { return scales[a] > scales[b]; });
-  expected.resize(777);
-  std::sort(expected.begin(), expected.end());
-  EXPECT_EQ(SelectLargestScales(scales, 777), expected);
-}
-
 TEST(SelectRandomTest, ReturnsDifferentRowsAscending) {
   for (const std::size_t max_num : {0u, 1u, 2u, 50u, 99u}) {
     const std::vector<std::size_t> rows = SelectRandom(100, max_num, Random({45}));

@@ -46,6 +46,8 @@ class VerifierTest : public ::testing::Test {
     database_path_ = directory_.Path() / "data base.db";
     WriteSyntheticDatabase(database_path_, Schema::kColmap38, MakePlaces(5, 5, 30, 1));
     options_.num_threads = 2;
+    // These images match as the test double says, not as their descriptors do.
+    options_.matcher = ColmapVerifierOptions::Matcher::kColmap;
     options_.lock_timeout = 5;
   }
 

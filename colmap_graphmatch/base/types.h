@@ -16,6 +16,9 @@ using PairId = std::uint64_t;
 // COLMAP's Database::kMaxNumImages (src/colmap/scene/database.h), the base of the pair_id codec.
 inline constexpr PairId kMaxNumImages = 2147483647;
 
+// The length of a SIFT descriptor.
+inline constexpr int kDescriptorDim = 128;
+
 // An unordered pair of two different images, kept with the smaller id first, as COLMAP stores it.
 struct ImagePair {
   ImagePair() = default;

@@ -33,6 +33,25 @@ std::string FormatStage(const char* name, const StageStatistics& stage) {
   return line + "\n";
 }
 
+// Where the time of matching went.
+std::string FormatVerification(const VerifierStatistics& statistics) {
+  const double both = statistics.matching_seconds + statistics.colmap_seconds;
+  if (statistics.num_matched == 0 || both <= 0) return "";
+  const auto num_matched = static_cast<double>(statistics.num_matched);
+  std::string text =
+      fmt::format("Exact matching     {} pairs in {} of CPU time, {:.2f} image reads a pair\n",
+                  statistics.num_matched, FormatDuration(statistics.matching_seconds),
+                  static_cast<double>(statistics.num_image_reads) / num_matched);
+  if (statistics.num_preempted > 0) {
+    text += fmt::format("Given up early     {} pairs\n", statistics.num_preempted);
+  }
+  text += fmt::format("COLMAP             {} pairs in {}, {:.0f} % of matching and verification\n",
+                      statistics.num_matched - statistics.num_unmatched,
+                      FormatDuration(statistics.colmap_seconds),
+                      100 * statistics.colmap_seconds / both);
+  return text;
+}
+
 }  // namespace
 
 Console::Console(std::FILE* stream)
@@ -89,10 +108,14 @@ std::string FormatDuration(double seconds) {
 }
 
 std::string FormatProgress(const LoopProgress& progress, double seconds_of_matching) {
-  const StageStatistics all = progress.sampling + progress.propagation;
+  const StageStatistics& all = progress.all;
+  const std::string stage = progress.stage == LoopStage::kListed     ? "matching"
+                            : progress.stage == LoopStage::kSampling ? "sampling"
+                                                                     : "propagation";
   std::string line = fmt::format(
-      "{} {}: {} tested, {} edges (efficiency {:.2f}), {} components, largest {}, {} alone",
-      progress.stage == LoopStage::kSampling ? "sampling" : "propagation", progress.iteration + 1,
+      "{}: {} tested, {} edges (efficiency {:.2f}), {} components, largest {}, {} alone",
+      progress.stage == LoopStage::kListed ? stage
+                                           : fmt::format("{} {}", stage, progress.iteration + 1),
       all.num_tested, progress.num_edges, all.Efficiency(), progress.num_components,
       progress.largest_component, progress.num_isolated);
   if (all.num_tested > 0 && seconds_of_matching > 1) {
@@ -109,7 +132,8 @@ std::string FormatSummary(const PipelineResult& result) {
   const auto num_images =
       static_cast<double>(result.num_images - result.num_images_without_features);
   const double num_possible = num_images * (num_images - 1) / 2;
-  const StageStatistics all = matching.sampling + matching.propagation;
+  const StageStatistics all = matching.All();
+  const bool listed = result.listed;
 
   std::string text = fmt::format("\nImages             {}", result.num_images);
   if (result.num_images_without_features > 0) {
@@ -118,15 +142,19 @@ std::string FormatSummary(const PipelineResult& result) {
   text += fmt::format("\nPairs tested       {} of {:.0f} possible ({:.2f} %)\n", all.num_tested,
                       num_possible, Share(all.num_tested, num_possible));
   if (matching.num_seed_pairs > 0) {
-    text += fmt::format("Known before       {} pairs of other matchers or options, {} edges\n",
-                        matching.num_seed_pairs, matching.num_seed_edges);
+    text +=
+        fmt::format(listed ? "Known before       {} pairs, {} edges\n"
+                           : "Known before       {} pairs of other matchers or options, {} edges\n",
+                    matching.num_seed_pairs, matching.num_seed_edges);
   }
   if (all.num_tested + all.num_failed == 0 && all.num_known > 0) {
     text += "                   Nothing is left to test with these options.\n";
   }
-  text += FormatStage("sampling", matching.sampling);
-  text += FormatStage("propagation", matching.propagation);
-  text += FormatStage("both", all);
+  if (!listed) {
+    text += FormatStage("sampling", matching.sampling);
+    text += FormatStage("propagation", matching.propagation);
+  }
+  text += FormatStage(listed ? "all" : "both", all);
   text +=
       fmt::format("Matching graph     {} edges, {} components, the largest of {} images\n",
                   matching.graph.NumEdges(), matching.num_components, matching.largest_component);
@@ -136,6 +164,7 @@ std::string FormatSummary(const PipelineResult& result) {
     text += fmt::format("Failed             {} pairs, see the warnings; they stay untested\n",
                         matching.failed_pairs.size());
   }
+  text += FormatVerification(result.verification);
   text += fmt::format(
       "Time               {} (mixture {}, Fisher vectors {}, ranking {}, matching {})\n",
       FormatDuration(result.total_seconds), FormatDuration(result.mixture_seconds),

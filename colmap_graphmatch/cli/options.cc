@@ -108,6 +108,13 @@ const Names<GraphMatchOptions::SamplingSchedule> kSchedules = {
 const Names<GraphMatchOptions::PropagationDistance> kDistances = {
     {"source", GraphMatchOptions::PropagationDistance::kSource},
     {"neighbor", GraphMatchOptions::PropagationDistance::kNeighbor}};
+const Names<PipelineOptions::Strategy> kStrategies = {
+    {"graphmatch", PipelineOptions::Strategy::kGraphMatch},
+    {"exhaustive", PipelineOptions::Strategy::kExhaustive}};
+const Names<ColmapVerifierOptions::Matcher> kMatchers = {
+    {"auto", ColmapVerifierOptions::Matcher::kAuto},
+    {"exact", ColmapVerifierOptions::Matcher::kExact},
+    {"colmap", ColmapVerifierOptions::Matcher::kColmap}};
 const Names<ImageVectorOptions::FeatureSelection> kSelections = {
     {"largest", ImageVectorOptions::FeatureSelection::kLargestScales},
     {"random", ImageVectorOptions::FeatureSelection::kRandom}};
@@ -151,7 +158,11 @@ class Options {
         "of this program's random choices; COLMAP's CPU matching has its own");
 
     po::options_description graph("GraphMatch: which pairs are tested", kLineLength, kHelpLength);
-    graph.add_options()(
+    graph.add_options()("GraphMatching.strategy",
+                        OneOf("GraphMatching.strategy", kStrategies, &p.strategy),
+                        "which pairs are tested: those that graphmatch finds, or exhaustive: all")(
+        "GraphMatching.match_list_path", po::value<std::string>(),
+        "a file of image pairs to be tested instead, two names a line")(
         "GraphMatching.number_sample_iterations", Field(&p.graph.number_sample_iterations),
         "iterations (>= 0) that sample before propagating; later ones only propagate")(
         "GraphMatching.max_tests_for_sampling", Field(&p.graph.max_tests_for_sampling),
@@ -190,6 +201,22 @@ class Options {
         "GraphMatching.num_training_descriptors", Field(&p.vectors.num_training_descriptors),
         "descriptors (>= 1) that the mixture is learnt from");
 
+    ExactMatcherOptions& exact = p.verification.exact;
+    po::options_description matching("GraphMatch: how descriptors are matched", kLineLength,
+                                     kHelpLength);
+    matching.add_options()(
+        "GraphMatching.matcher", OneOf("GraphMatching.matcher", kMatchers, &p.verification.matcher),
+        "exact: by this program; colmap: by COLMAP; auto: by COLMAP if it has a GPU and use_gpu is "
+        "on, else exact")(
+        "GraphMatching.cache_gb", Field(&exact.cache_gb),
+        "GB (>= 0) of descriptors kept in memory; 0: a quarter of the memory. Less reads images "
+        "more often")("GraphMatching.preemptive_num_features",
+                      Field(&exact.preemptive_num_features),
+                      "features (>= 1) of the largest scales that are matched first, to drop pairs "
+                      "without any match early; 0: match all at once")(
+        "GraphMatching.preemptive_min_matches", Field(&exact.preemptive_min_matches),
+        "matches (>= 1) of those that keep a pair");
+
     po::options_description work("GraphMatch: how COLMAP is run", kLineLength, kHelpLength);
     work.add_options()("GraphMatching.num_processes", Field(&p.verification.num_processes),
                        "COLMAP processes at a time; 0: one a core without a GPU, else one")(
@@ -217,7 +244,7 @@ class Options {
     for (const char* name : kUnusedOptions) {
       hidden_.add_options()(name, po::value<std::string>(), "");
     }
-    visible_.add(general).add(graph).add(vectors).add(work).add(colmap);
+    visible_.add(general).add(graph).add(vectors).add(matching).add(work).add(colmap);
   }
 
   CommandLine Parse(int argc, const char* const* argv) {
@@ -246,6 +273,9 @@ class Options {
     line_.pipeline.database_path = values["database_path"].as<std::string>();
     if (values.count("GraphMatching.work_path") > 0) {
       line_.pipeline.work_path = values["GraphMatching.work_path"].as<std::string>();
+    }
+    if (values.count("GraphMatching.match_list_path") > 0) {
+      line_.pipeline.match_list_path = values["GraphMatching.match_list_path"].as<std::string>();
     }
     for (const ColmapOption& option : kColmapOptions) ReadColmapOption(option, values);
     for (const char* name : kUnusedOptions) {
@@ -276,6 +306,7 @@ class Options {
     if (given.empty()) return;
 
     PipelineOptions& p = line_.pipeline;
+    DescriptorMatchingOptions& matching = p.verification.exact.matching;
     try {
       const std::string name = option.name;
       if (option.type == ValueType::kBool) {
@@ -284,6 +315,7 @@ class Options {
           p.verification.use_gpu = value;
           return;
         }
+        if (name == "cross_check") matching.cross_check = value;
         text = value ? "1" : "0";
       } else if (option.type == ValueType::kInt) {
         const int value = boost::lexical_cast<int>(text);
@@ -291,12 +323,15 @@ class Options {
           p.num_threads = value;
           return;
         }
+        if (name == "max_num_matches") matching.max_num_matches = value;
         if (name == "min_num_inliers") {
           p.verification.min_num_inliers = value;
           return;
         }
       } else if (option.type == ValueType::kDouble) {
-        boost::lexical_cast<double>(text);
+        const auto value = boost::lexical_cast<double>(text);
+        if (name == "max_ratio") matching.max_ratio = value;
+        if (name == "max_distance") matching.max_distance = value;
       }
       p.verification.colmap_options[name] = text;
     } catch (const boost::bad_lexical_cast&) {

@@ -76,6 +76,19 @@ float Keypoints::Scale(std::size_t row) const {
   }
 }
 
+std::vector<float> Keypoints::Scales(std::size_t num) const {
+  std::vector<float> scales(num);
+  for (std::size_t row = 0; row < std::min(num, num_rows); ++row) scales[row] = Scale(row);
+  return scales;
+}
+
+std::vector<std::uint8_t> Descriptors::CopyRows(const std::vector<std::size_t>& rows) const {
+  std::vector<std::uint8_t> copy;
+  copy.reserve(rows.size() * kDescriptorDim);
+  for (const std::size_t row : rows) copy.insert(copy.end(), Row(row), Row(row) + kDescriptorDim);
+  return copy;
+}
+
 bool IsEdge(std::size_t num_inliers, int config, std::size_t min_num_inliers) {
   return num_inliers >= std::max<std::size_t>(1, min_num_inliers) && config > 1 && config != 7;
 }
@@ -251,6 +264,15 @@ std::vector<TestedPair> Database::ReadTestedPairs() {
     tested.push_back(pair);
   }
   return tested;
+}
+
+std::vector<ImagePair> Database::ReadUnverifiedPairs() {
+  sqlite::Statement select(connection_,
+                           "SELECT pair_id FROM matches WHERE pair_id NOT IN "
+                           "(SELECT pair_id FROM two_view_geometries) ORDER BY pair_id");
+  std::vector<ImagePair> pairs;
+  while (select.Step()) pairs.push_back(DecodePair(static_cast<PairId>(select.Int(0))));
+  return pairs;
 }
 
 void Database::CheckWritable() { const sqlite::Transaction rolled_back(connection_); }

@@ -74,6 +74,9 @@ class Database {
   // a row in `matches` before they skip a pair; what is verified is never verified again here.)
   std::vector<TestedPair> ReadTestedPairs();
 
+  // The pairs that have matches, made elsewhere, and no two-view geometry yet, ascending.
+  std::vector<ImagePair> ReadUnverifiedPairs();
+
   // Takes the write lock for a moment: that the database cannot be written should not be learnt
   // late.
   void CheckWritable();

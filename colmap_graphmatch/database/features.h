@@ -4,10 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace colmap_graphmatch {
+#include "colmap_graphmatch/base/types.h"
 
-// The length of a SIFT descriptor.
-inline constexpr int kDescriptorDim = 128;
+namespace colmap_graphmatch {
 
 // SIFT descriptors of one image as COLMAP stores them: num_rows x 128, row-major, each entry
 // round(512 x) clipped to 255 for an entry x of the unit-length descriptor.
@@ -16,6 +15,9 @@ struct Descriptors {
   std::vector<std::uint8_t> data;
 
   const std::uint8_t* Row(std::size_t row) const { return data.data() + row * kDescriptorDim; }
+
+  // The given rows, one after the other.
+  std::vector<std::uint8_t> CopyRows(const std::vector<std::size_t>& rows) const;
 };
 
 // Keypoints of one image as COLMAP stores them: num_rows x num_cols, row-major. num_cols is 2 (x,
@@ -28,6 +30,9 @@ struct Keypoints {
   // In pixels; 0 where the keypoints have no scale (num_cols 2). COLMAP's
   // FeatureKeypoint::ComputeScale (src/colmap/feature/types.cc).
   float Scale(std::size_t row) const;
+
+  // Of the first `num` rows; 0 where there are fewer.
+  std::vector<float> Scales(std::size_t num) const;
 };
 
 }  // namespace colmap_graphmatch

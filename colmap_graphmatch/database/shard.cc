@@ -13,6 +13,8 @@ namespace {
 // The largest value of TwoViewGeometry::ConfigurationType (MULTIPLE).
 constexpr int kMaxConfig = 8;
 
+constexpr std::size_t kBytesPerMatch = 2 * sizeof(std::uint32_t);
+
 // "INSERT INTO table(common columns) SELECT common columns FROM source.table", so that databases of
 // different versions of COLMAP can be copied into each other. Columns without a counterpart take
 // their default; replacements give the expression for a column that is not to be copied as it is.
@@ -37,16 +39,15 @@ sqlite::Blob CheckedMatches(const sqlite::Statement& row, int rows_column, int c
                             int data_column, std::size_t num_features1, std::size_t num_features2) {
   const std::int64_t rows = row.Int(rows_column);
   sqlite::Blob matches = row.CopyBlob(data_column);
-  const std::size_t bytes_per_row = 2 * sizeof(std::uint32_t);
   // Divided, not multiplied: a nonsensical number of rows must not overflow into a right one.
-  if (rows < 0 || matches.size() % bytes_per_row != 0 ||
-      matches.size() / bytes_per_row != static_cast<std::size_t>(rows) ||
+  if (rows < 0 || matches.size() % kBytesPerMatch != 0 ||
+      matches.size() / kBytesPerMatch != static_cast<std::size_t>(rows) ||
       (rows > 0 && row.Int(cols_column) != 2)) {
     throw DatabaseError("a blob of matches of the wrong size");
   }
-  for (std::size_t offset = 0; offset < matches.size(); offset += bytes_per_row) {
+  for (std::size_t offset = 0; offset < matches.size(); offset += kBytesPerMatch) {
     std::array<std::uint32_t, 2> match = {};
-    std::memcpy(match.data(), matches.data() + offset, bytes_per_row);
+    std::memcpy(match.data(), matches.data() + offset, kBytesPerMatch);
     if (match[0] >= num_features1 || match[1] >= num_features2) {
       throw DatabaseError("a match of features that the images do not have");
     }
@@ -59,7 +60,8 @@ sqlite::Blob CheckedMatches(const sqlite::Statement& row, int rows_column, int c
 std::string ShardImageName(ImageId image_id) { return std::to_string(image_id); }
 
 void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
-               double lock_timeout_seconds, const std::vector<ImagePair>& pairs) {
+               double lock_timeout_seconds, const std::vector<ShardPair>& pairs,
+               bool with_descriptors) {
   sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, lock_timeout_seconds);
   shard.AttachReadOnly(database_path, "source");
   // A shard is thrown away when anything goes wrong: it need not survive a crash.
@@ -70,7 +72,7 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
   sqlite::Transaction transaction(shard);
   sqlite::Statement add_id(shard, "INSERT OR IGNORE INTO ids VALUES(?1)");
   sqlite::Statement add_pair(shard, "INSERT OR IGNORE INTO pair_ids VALUES(?1)");
-  for (const ImagePair& pair : pairs) {
+  for (const auto& [pair, matches] : pairs) {
     add_id.Bind(1, std::int64_t{pair.id1}).Run();
     add_id.Bind(1, std::int64_t{pair.id2}).Run();
     add_pair.Bind(1, static_cast<std::int64_t>(EncodePair(pair))).Run();
@@ -80,22 +82,34 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
                 " WHERE camera_id IN (SELECT camera_id FROM source.images" + of_images + ")");
   shard.Execute(CopyTable(shard, "images", {{"name", "CAST(image_id AS TEXT)"}}) + of_images);
   shard.Execute(CopyTable(shard, "keypoints", {}) + of_images);
-  const std::vector<std::string> source_columns = shard.Columns("descriptors", "source");
-  const bool typed =
-      std::find(source_columns.begin(), source_columns.end(), "type") != source_columns.end();
-  // 0 is SIFT, the only type that versions without the column had.
-  shard.Execute(CopyTable(shard, "descriptors",
-                          typed ? std::map<std::string, std::string>{}
-                                : std::map<std::string, std::string>{{"type", "0"}}) +
-                of_images);
+  if (with_descriptors) {
+    const std::vector<std::string> source_columns = shard.Columns("descriptors", "source");
+    const bool typed =
+        std::find(source_columns.begin(), source_columns.end(), "type") != source_columns.end();
+    // 0 is SIFT, the only type that versions without the column had.
+    shard.Execute(CopyTable(shard, "descriptors",
+                            typed ? std::map<std::string, std::string>{}
+                                  : std::map<std::string, std::string>{{"type", "0"}}) +
+                  of_images);
+  }
   shard.Execute(CopyTable(shard, "matches", {}) +
                 " WHERE pair_id IN (SELECT pair_id FROM pair_ids) AND pair_id NOT IN "
                 "(SELECT pair_id FROM source.two_view_geometries)");
+  sqlite::Statement add_matches(
+      shard,
+      "INSERT OR REPLACE INTO main.matches(pair_id, rows, cols, data) VALUES(?1, ?2, 2, ?3)");
+  for (const auto& [pair, matches] : pairs) {
+    if (!matches) continue;
+    add_matches.Bind(1, static_cast<std::int64_t>(EncodePair(pair)))
+        .Bind(2, static_cast<std::int64_t>(matches->size() / kBytesPerMatch))
+        .Bind(3, *matches)
+        .Run();
+  }
   transaction.Commit();
 }
 
 std::vector<PairRows> ReadShard(const std::filesystem::path& shard_path,
-                                const std::vector<ImagePair>& pairs,
+                                const std::vector<ShardPair>& pairs,
                                 const std::map<ImageId, std::size_t>& num_features) {
   sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, 0);
   const std::vector<std::string> existing = shard.Columns("two_view_geometries");
@@ -114,7 +128,8 @@ std::vector<PairRows> ReadShard(const std::filesystem::path& shard_path,
 
   std::vector<PairRows> results;
   results.reserve(pairs.size());
-  for (const ImagePair& pair : pairs) {
+  for (const ShardPair& shard_pair : pairs) {
+    const ImagePair& pair = shard_pair.pair;
     const auto pair_id = static_cast<std::int64_t>(EncodePair(pair));
     PairRows rows;
     rows.pair = pair;

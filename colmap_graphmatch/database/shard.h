@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "colmap_graphmatch/base/types.h"
@@ -16,17 +17,26 @@ namespace colmap_graphmatch {
 // The name that an image has in shards: its id. COLMAP's lists of pairs break on spaces in names.
 std::string ShardImageName(ImageId image_id);
 
-// Copies the cameras, images, keypoints and descriptors of the pairs' images from the user's
-// database into the empty shard, and the rows of `matches` of those pairs that have some: matches
-// that were made elsewhere and await verification. Ids stay the same. Throws DatabaseError.
+struct ShardPair {
+  ImagePair pair;
+
+  // num x 2 uint32 feature indices, for COLMAP to verify; none: COLMAP matches the pair itself.
+  std::optional<sqlite::Blob> matches;
+};
+
+// Copies the cameras, images and keypoints of the pairs' images from the user's database into the
+// empty shard, their descriptors if COLMAP is to match, and the rows of `matches` of those pairs
+// that have some: matches that were made elsewhere and await verification. Adds the matches of the
+// pairs. Ids stay the same. Throws DatabaseError.
 void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
-               double lock_timeout_seconds, const std::vector<ImagePair>& pairs);
+               double lock_timeout_seconds, const std::vector<ShardPair>& pairs,
+               bool with_descriptors);
 
 // What COLMAP wrote into the shard for the pairs. Throws DatabaseError if a pair has no result, or
 // one that cannot be: wrong sizes, features that the images do not have (num_features, by image),
 // unknown configurations.
 std::vector<PairRows> ReadShard(const std::filesystem::path& shard_path,
-                                const std::vector<ImagePair>& pairs,
+                                const std::vector<ShardPair>& pairs,
                                 const std::map<ImageId, std::size_t>& num_features);
 
 }  // namespace colmap_graphmatch

@@ -13,7 +13,8 @@
 
 namespace colmap_graphmatch {
 
-enum class LoopStage { kSampling, kPropagation };
+// kListed: the pairs were given beforehand (see listed_pairs.h).
+enum class LoopStage { kSampling, kPropagation, kListed };
 
 struct StageStatistics {
   std::size_t num_tested = 0;  // Pairs that the verifier tested in this run.
@@ -40,8 +41,7 @@ struct IterationStatistics {
 struct LoopProgress {
   LoopStage stage = LoopStage::kSampling;
   int iteration = 0;
-  StageStatistics sampling;
-  StageStatistics propagation;
+  StageStatistics all;        // Of all stages together.
   std::size_t num_edges = 0;  // Of the whole graph, those of earlier runs included.
   std::size_t num_components = 0;
   std::size_t largest_component = 0;
@@ -56,6 +56,7 @@ struct GraphMatchResult {
   std::vector<IterationStatistics> iterations;
   StageStatistics sampling;
   StageStatistics propagation;
+  StageStatistics listed;
   // Pairs that were in the database before the run and that the loop did not ask for itself.
   std::size_t num_seed_pairs = 0;
   std::size_t num_seed_edges = 0;
@@ -64,6 +65,8 @@ struct GraphMatchResult {
   std::size_t num_isolated = 0;
   std::vector<ImagePair> failed_pairs;
   bool finished = true;  // False if the verifier was asked to stop.
+
+  StageStatistics All() const { return sampling + propagation + listed; }
 };
 
 // The sample-and-propagate loop (GraphMatch, section 3; the pseudo-code is in docs/design.md).

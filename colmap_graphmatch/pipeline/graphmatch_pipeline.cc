@@ -7,6 +7,9 @@
 #include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/graph/listed_pairs.h"
+#include "colmap_graphmatch/matching/top_two.h"
+#include "colmap_graphmatch/pipeline/pair_list.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 
@@ -42,9 +45,49 @@ void Describe(const GmmTraining& training, const PipelineOptions& options,
                   (training.converged ? "" : " (not yet converged)") + ".");
 }
 
+// From the features to ranked lists: mixture, Fisher vectors, distances.
+Ranking RankImages(const PipelineOptions& options, Database& database,
+                   const std::vector<ImageRecord>& images, ThreadPool& threads,
+                   const StopRequest& stop, PipelineObserver& observer, PipelineResult* result) {
+  ImageVectorOptions vector_options = options.vectors;
+  vector_options.seed = options.seed;
+  vector_options.gmm.seed = options.seed;
+  const GmmTraining training = Timed(&result->mixture_seconds, [&] {
+    return LearnMixture(vector_options, database, images, threads, stop);
+  });
+  Describe(training, options, observer);
+
+  std::vector<float> vectors = Timed(&result->vectors_seconds, [&] {
+    return EncodeImages(vector_options, training.mixture, database, images, threads, stop);
+  });
+  const std::size_t dim = vectors.size() / images.size();
+  observer.OnInfo("Described " + std::to_string(images.size()) + " images by Fisher vectors of " +
+                  std::to_string(dim) + " entries.");
+  return Timed(&result->ranking_seconds, [&] {
+    return Ranking(options.ranking, images.size(), dim, std::move(vectors), threads, &stop);
+  });
+}
+
+std::vector<ImagePair> ReadListedPairs(const std::filesystem::path& path,
+                                       const std::vector<ImageRecord>& images,
+                                       PipelineObserver& observer) {
+  PairList list = ReadPairList(path, images);
+  if (list.num_skipped > 0) {
+    observer.OnWarning(std::to_string(list.num_skipped) + " lines of " + path.string() +
+                       " do not name two images of the database and are skipped; the first is \"" +
+                       list.first_skipped + "\".");
+  }
+  return std::move(list.pairs);
+}
+
 }  // namespace
 
 void PipelineOptions::Check() const {
+  if (!match_list_path.empty() && strategy != Strategy::kGraphMatch) {
+    throw OptionsError(
+        "--GraphMatching.match_list_path and --GraphMatching.strategy exhaustive contradict each "
+        "other: give one of them.");
+  }
   EffectiveNumThreads(num_threads);
   vectors.Check();
   graph.Check();
@@ -79,33 +122,33 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
   verifier_options.num_threads = options.num_threads;
   ColmapVerifier verifier(verifier_options, colmap, database, images, work.Path(), stop,
                           [&](const std::string& warning) { observer.OnWarning(warning); });
+  observer.OnInfo(std::string("Descriptors are matched ") +
+                  (verifier.MatchesHere() ? std::string("exactly, with ") + TopTwoTarget() + "."
+                                          : "by COLMAP."));
   observer.OnInfo("COLMAP " + colmap.Version() + " at " + colmap.executable.string() + ", " +
                   (verifier.UsesGpu() ? "GPU" : "CPU") +
                   ", processes: " + std::to_string(verifier.NumProcesses()) +
                   ", threads in each: " + std::to_string(verifier.NumThreadsPerProcess()) + ".");
 
-  ImageVectorOptions vector_options = options.vectors;
-  vector_options.seed = options.seed;
-  vector_options.gmm.seed = options.seed;
-  const GmmTraining training = Timed(&result.mixture_seconds, [&] {
-    return LearnMixture(vector_options, database, images, threads, stop);
-  });
-  Describe(training, options, observer);
-
-  std::vector<float> vectors = Timed(&result.vectors_seconds, [&] {
-    return EncodeImages(vector_options, training.mixture, database, images, threads, stop);
-  });
-  const std::size_t dim = vectors.size() / images.size();
-  const Ranking ranking = Timed(&result.ranking_seconds, [&] {
-    return Ranking(options.ranking, images.size(), dim, std::move(vectors), threads, &stop);
-  });
-  observer.OnInfo("Described and ranked " + std::to_string(images.size()) +
-                  " images by Fisher vectors of " + std::to_string(dim) + " entries.");
-
-  result.matching = Timed(&result.matching_seconds, [&] {
-    return RunGraphMatch(options.graph, ranking, Ids(images), verifier, threads,
-                         [&](const LoopProgress& progress) { observer.OnProgress(progress); });
-  });
+  result.listed = !options.match_list_path.empty() ||
+                  options.strategy == PipelineOptions::Strategy::kExhaustive;
+  const auto on_progress = [&](const LoopProgress& progress) { observer.OnProgress(progress); };
+  if (!options.match_list_path.empty()) {
+    const std::vector<ImagePair> pairs =
+        ReadListedPairs(options.match_list_path, all_images, observer);
+    result.matching = Timed(&result.matching_seconds, [&] {
+      return VerifyListedPairs(pairs, Ids(images), verifier, on_progress);
+    });
+  } else if (options.strategy == PipelineOptions::Strategy::kExhaustive) {
+    result.matching = Timed(&result.matching_seconds,
+                            [&] { return VerifyAllPairs(Ids(images), verifier, on_progress); });
+  } else {
+    const Ranking ranking = RankImages(options, database, images, threads, stop, observer, &result);
+    result.matching = Timed(&result.matching_seconds, [&] {
+      return RunGraphMatch(options.graph, ranking, Ids(images), verifier, threads, on_progress);
+    });
+  }
+  result.verification = verifier.Statistics();
   result.total_seconds = total.Seconds();
   return result;
 }

@@ -16,6 +16,13 @@ namespace colmap_graphmatch {
 struct PipelineOptions {
   std::filesystem::path database_path;
 
+  // Which pairs are tested: those that GraphMatch's loop finds, or all.
+  enum class Strategy { kGraphMatch, kExhaustive };
+  Strategy strategy = Strategy::kGraphMatch;
+
+  // Tests the pairs of this list (see pair_list.h) instead, unless it is empty.
+  std::filesystem::path match_list_path;
+
   // A path, or a name to be found on PATH.
   std::string colmap_path = "colmap";
 
@@ -50,7 +57,9 @@ class PipelineObserver {
 struct PipelineResult {
   std::size_t num_images = 0;
   std::size_t num_images_without_features = 0;
+  bool listed = false;  // The pairs were given, all or a list: no sampling, no propagation.
   GraphMatchResult matching;
+  VerifierStatistics verification;
   double mixture_seconds = 0;
   double vectors_seconds = 0;
   double ranking_seconds = 0;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/largest_scales.h"
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/encoding/descriptor_selection.h"
 #include "colmap_graphmatch/encoding/fisher_vector.h"
@@ -24,12 +25,7 @@ struct SelectedDescriptors {
   std::vector<std::uint8_t> data;
 
   SelectedDescriptors(const Descriptors& all, const std::vector<std::size_t>& rows)
-      : num(rows.size()) {
-    data.reserve(num * kDescriptorDim);
-    for (const std::size_t row : rows) {
-      data.insert(data.end(), all.Row(row), all.Row(row) + kDescriptorDim);
-    }
-  }
+      : num(rows.size()), data(all.CopyRows(rows)) {}
 };
 
 Random ImageRandom(const ImageVectorOptions& options, RandomStage stage, ImageId image_id) {
@@ -128,11 +124,8 @@ std::vector<float> EncodeImages(const ImageVectorOptions& options, const Gaussia
               SelectRandom(descriptors.num_rows, max_num_features,
                            ImageRandom(options, RandomStage::kFeatureSelection, image.id)));
         }
-        const Keypoints keypoints = database.ReadKeypoints(image.id);
-        std::vector<float> scales(descriptors.num_rows);
-        for (std::size_t row = 0; row < std::min(scales.size(), keypoints.num_rows); ++row) {
-          scales[row] = keypoints.Scale(row);
-        }
+        const std::vector<float> scales =
+            database.ReadKeypoints(image.id).Scales(descriptors.num_rows);
         return SelectedDescriptors(descriptors, SelectLargestScales(scales, max_num_features));
       },
       [&](std::size_t i, const SelectedDescriptors& selected) {

@@ -12,8 +12,9 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/base/thread_pool.h"
-#include "colmap_graphmatch/database/shard.h"
+#include "colmap_graphmatch/matching/pair_order.h"
 #include "colmap_graphmatch/verification/subprocess.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 
@@ -43,8 +44,10 @@ constexpr double kMinTimeoutSeconds = 30;
 // Less free space than this in the working directory explains any failure of COLMAP.
 constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
 
-std::vector<std::vector<ImagePair>> CutIntoShards(const std::vector<ImagePair>& pairs,
+// Pairs that share images come into the same shard, and shards that do follow each other.
+std::vector<std::vector<ImagePair>> CutIntoShards(std::vector<ImagePair> pairs,
                                                   std::size_t max_pairs_per_shard) {
+  SortForReuse(&pairs);
   const std::size_t wanted = (pairs.size() + kShardsPerBatch - 1) / kShardsPerBatch;
   const std::size_t size = std::min(std::max(wanted, kMinPairsPerShard), max_pairs_per_shard);
   std::vector<std::vector<ImagePair>> shards;
@@ -60,6 +63,7 @@ std::vector<std::vector<ImagePair>> CutIntoShards(const std::vector<ImagePair>& 
 
 void ColmapVerifierOptions::Check() const {
   EffectiveNumThreads(num_threads);
+  exact.Check();
   if (num_processes < 0) {
     throw OptionsError("The number of COLMAP processes must be positive, or 0 to have it chosen.");
   }
@@ -74,6 +78,7 @@ struct ColmapVerifier::Batch {
   struct Part {
     std::vector<PairRows> results;
     std::vector<Failure> failures;
+    bool from_colmap = true;
   };
 
   std::mutex mutex;
@@ -104,7 +109,10 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
       stop_(stop),
       on_warning_(on_warning) {
   options_.Check();
-  options_.use_gpu = options.use_gpu && colmap.has_gpu;
+  const bool gpu = options.use_gpu && colmap.has_gpu;
+  const bool exact = options.matcher == ColmapVerifierOptions::Matcher::kExact ||
+                     (options.matcher == ColmapVerifierOptions::Matcher::kAuto && !gpu);
+  options_.use_gpu = gpu && !exact;
   for (const ImageRecord& image : images) images_.emplace(image.id, image);
   for (const TestedPair& tested : database.ReadTestedPairs()) {
     const auto min_num_inliers = static_cast<std::size_t>(options.min_num_inliers);
@@ -118,6 +126,16 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
                    : options_.use_gpu        ? 1
                                              : num_threads;
   threads_per_process_ = std::max(1, num_threads / num_processes_);
+
+  if (exact) {
+    exact_matcher_ =
+        std::make_unique<ExactMatcher>(options.exact, database.Path(), options.lock_timeout,
+                                       static_cast<std::size_t>(num_processes_));
+    unverified_ = database.ReadUnverifiedPairs();
+    // Guided matching is COLMAP's: it matches once more where the geometry says so.
+    const auto guided = options.colmap_options.find("guided_matching");
+    shards_with_descriptors_ = guided != options.colmap_options.end() && guided->second != "0";
+  }
 
   std::map<std::string, std::string> colmap_options = options.colmap_options;
   colmap_options["use_gpu"] = options_.use_gpu ? "1" : "0";
@@ -168,7 +186,56 @@ void ColmapVerifier::CheckThatColmapWorks(const std::vector<PairRows>& results,
   }
 }
 
-std::string ColmapVerifier::TryShard(const std::vector<ImagePair>& pairs, Batch* batch,
+VerifierStatistics ColmapVerifier::Statistics() const {
+  VerifierStatistics statistics = statistics_;
+  if (exact_matcher_) {
+    statistics.num_matched = exact_matcher_->NumPairs();
+    statistics.num_preempted = exact_matcher_->NumPreempted();
+    statistics.num_image_reads = exact_matcher_->NumReads();
+  }
+  return statistics;
+}
+
+std::vector<ShardPair> ColmapVerifier::Match(const std::vector<ImagePair>& pairs, Batch* batch) {
+  std::vector<ShardPair> to_verify;
+  std::vector<ImagePair> to_match;
+  for (const ImagePair& pair : pairs) {
+    const bool has_matches = std::binary_search(unverified_.begin(), unverified_.end(), pair);
+    if (exact_matcher_ == nullptr || has_matches) {
+      to_verify.push_back({pair, std::nullopt});
+    } else {
+      to_match.push_back(pair);
+    }
+  }
+  if (to_match.empty()) return to_verify;
+
+  const double start = ThreadCpuSeconds();
+  std::vector<std::vector<FeatureMatch>> matches;
+  const auto should_stop = [&] { return stop_.Abandon() || batch->abort.load(); };
+  if (!exact_matcher_->Match(to_match, should_stop, &matches)) return {};
+  Batch::Part unmatched;
+  unmatched.from_colmap = false;
+  for (std::size_t i = 0; i < to_match.size(); ++i) {
+    if (matches[i].size() < static_cast<std::size_t>(options_.min_num_inliers)) {
+      PairRows rows;
+      rows.pair = to_match[i];
+      unmatched.results.push_back(std::move(rows));
+    } else {
+      const auto* bytes = reinterpret_cast<const std::uint8_t*>(matches[i].data());
+      to_verify.push_back(
+          {to_match[i], sqlite::Blob(bytes, bytes + matches[i].size() * sizeof(FeatureMatch))});
+    }
+  }
+  {
+    const std::lock_guard<std::mutex> lock(batch->mutex);
+    statistics_.matching_seconds += ThreadCpuSeconds() - start;
+    statistics_.num_unmatched += unmatched.results.size();
+  }
+  if (!unmatched.results.empty()) batch->Push(std::move(unmatched));
+  return to_verify;
+}
+
+std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch* batch,
                                      std::vector<PairRows>* results) {
   double timeout = options_.timeout_per_pair * static_cast<double>(pairs.size() + 1);
   {
@@ -184,7 +251,8 @@ std::string ColmapVerifier::TryShard(const std::vector<ImagePair>& pairs, Batch*
   const std::filesystem::path output_path = shard.Path() / "output.txt";
   try {
     std::filesystem::copy_file(template_path_, database_path);
-    FillShard(database_path, database_.Path(), options_.lock_timeout, pairs);
+    FillShard(database_path, database_.Path(), options_.lock_timeout, pairs,
+              shards_with_descriptors_);
   } catch (const std::filesystem::filesystem_error& error) {
     throw FileError("Cannot make a shard in the working directory: " + std::string(error.what()) +
                     ". Name another directory with --GraphMatching.work_path.");
@@ -193,7 +261,7 @@ std::string ColmapVerifier::TryShard(const std::vector<ImagePair>& pairs, Batch*
     throw;
   }
   std::ofstream list(list_path);
-  for (const ImagePair& pair : pairs) {
+  for (const auto& [pair, matches] : pairs) {
     list << ShardImageName(pair.id1) << ' ' << ShardImageName(pair.id2) << '\n';
   }
   list.close();
@@ -213,7 +281,7 @@ std::string ColmapVerifier::TryShard(const std::vector<ImagePair>& pairs, Batch*
   } else {
     try {
       std::map<ImageId, std::size_t> num_features;
-      for (const ImagePair& pair : pairs) {
+      for (const auto& [pair, matches] : pairs) {
         num_features[pair.id1] = images_.at(pair.id1).num_features;
         num_features[pair.id2] = images_.at(pair.id2).num_features;
       }
@@ -228,12 +296,13 @@ std::string ColmapVerifier::TryShard(const std::vector<ImagePair>& pairs, Batch*
     return problem;
   }
   const std::lock_guard<std::mutex> lock(batch->mutex);
+  statistics_.colmap_seconds += run.seconds;
   slowest_seconds_per_pair_ =
       std::max(slowest_seconds_per_pair_, run.seconds / static_cast<double>(pairs.size()));
   return "";
 }
 
-void ColmapVerifier::ProcessShard(const std::vector<ImagePair>& pairs, Batch* batch) {
+void ColmapVerifier::ProcessShard(const std::vector<ShardPair>& pairs, Batch* batch) {
   Batch::Part part;
   std::string problem;
   for (int i = 0; i < kTries; ++i) {
@@ -246,7 +315,7 @@ void ColmapVerifier::ProcessShard(const std::vector<ImagePair>& pairs, Batch* ba
   }
   if (stop_.Abandon() || batch->abort) return;
   if (pairs.size() == 1) {
-    part.failures.emplace_back(pairs.front(), problem);
+    part.failures.emplace_back(pairs.front().pair, problem);
     batch->Push(std::move(part));
     return;
   }
@@ -269,7 +338,8 @@ void ColmapVerifier::Work(Batch* batch) {
         shard = std::move(batch->shards.front());
         batch->shards.pop_front();
       }
-      ProcessShard(shard, batch);
+      const std::vector<ShardPair> to_verify = Match(shard, batch);
+      if (!to_verify.empty()) ProcessShard(to_verify, batch);
     }
   } catch (...) {
     const std::lock_guard<std::mutex> lock(batch->mutex);
@@ -316,7 +386,7 @@ bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
       batch.finished.pop_front();
       batch.changed.notify_all();
       lock.unlock();
-      CheckThatColmapWorks(part.results, part.failures);
+      if (part.from_colmap) CheckThatColmapWorks(part.results, part.failures);
       if (!part.results.empty()) database_.WritePairs(part.results);
       for (const PairRows& rows : part.results) {
         const bool is_edge = IsEdge(rows.num_inliers, rows.config,

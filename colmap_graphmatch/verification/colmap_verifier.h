@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <utility>
@@ -13,16 +14,25 @@
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/database/shard.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
+#include "colmap_graphmatch/verification/exact_matcher.h"
 
 namespace colmap_graphmatch {
 
 struct ColmapVerifierOptions {
+  // Who matches descriptors. kAuto: COLMAP if it has a GPU and may use it, else this library.
+  enum class Matcher { kAuto, kExact, kColmap };
+  Matcher matcher = Matcher::kAuto;
+
+  ExactMatcherOptions exact;
+
   // The cores that all COLMAP processes together may use; -1: all.
   int num_threads = -1;
 
   // COLMAP processes at a time; each gets num_threads / num_processes threads. 0: num_threads
-  // processes of one thread without a GPU, and one process with it (docs/design.md).
+  // processes of one thread without a GPU, and one process with it (docs/design.md). Descriptors
+  // are matched by one thread for each process, when that process does not run.
   int num_processes = 0;
 
   // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
@@ -51,8 +61,22 @@ struct ColmapVerifierOptions {
   void Check() const;
 };
 
-// Has COLMAP match and verify the pairs, in shards (see docs/design.md), and writes every finished
-// shard to the user's database in one transaction.
+struct VerifierStatistics {
+  // CPU time of matching descriptors here, summed over threads, and the time in which COLMAP ran,
+  // summed over processes.
+  double matching_seconds = 0;
+  double colmap_seconds = 0;
+
+  std::size_t num_matched = 0;    // Pairs whose descriptors were matched here,
+  std::size_t num_preempted = 0;  // those of them given up after the features of largest scale,
+  std::size_t num_unmatched = 0;  // and those with fewer matches than an edge needs inliers.
+  std::size_t num_image_reads = 0;
+};
+
+// Has pairs matched and verified, in shards (see docs/design.md), and writes every finished
+// shard to the user's database in one transaction. Descriptors are matched here or by COLMAP; the
+// geometric verification is always COLMAP's. Pairs with fewer matches here than an edge needs
+// inliers never reach COLMAP and get the rows that it would write.
 //
 // A shard on which COLMAP crashes, hangs or writes nonsense is tried again, then halved until the
 // pair that is to blame is alone; that one is reported as kFailed and through on_warning, and stays
@@ -72,6 +96,10 @@ class ColmapVerifier : public PairVerifier {
   int NumProcesses() const { return num_processes_; }
   int NumThreadsPerProcess() const { return threads_per_process_; }
   bool UsesGpu() const { return options_.use_gpu; }
+  bool MatchesHere() const { return exact_matcher_ != nullptr; }
+
+  // Of all calls of Verify so far. Not to be called during one on another thread.
+  VerifierStatistics Statistics() const;
 
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_; }
   bool Verify(const std::vector<ImagePair>& pairs,
@@ -84,9 +112,11 @@ class ColmapVerifier : public PairVerifier {
   std::string ImageName(ImageId image_id) const { return images_.at(image_id).name; }
   // What a worker thread does: takes shards until none is left.
   void Work(Batch* batch);
-  void ProcessShard(const std::vector<ImagePair>& pairs, Batch* batch);
+  // Matches the pairs here. Those with too few matches are done; returns the others.
+  std::vector<ShardPair> Match(const std::vector<ImagePair>& pairs, Batch* batch);
+  void ProcessShard(const std::vector<ShardPair>& pairs, Batch* batch);
   // One run of COLMAP on the pairs. An empty string if it went well; otherwise what went wrong.
-  std::string TryShard(const std::vector<ImagePair>& pairs, Batch* batch,
+  std::string TryShard(const std::vector<ShardPair>& pairs, Batch* batch,
                        std::vector<PairRows>* results);
   void ThrowIfDiskIsFull() const;
   // Throws ColmapError once COLMAP has failed on pairs that have nothing in common.
@@ -103,10 +133,15 @@ class ColmapVerifier : public PairVerifier {
   std::function<void(const std::string&)> on_warning_;
   int num_processes_ = 1;
   int threads_per_process_ = 1;
-  std::vector<std::string> arguments_;  // Of every run of matches_importer.
-  std::vector<VerifiedPair> known_;     // Ascending.
-  double slowest_seconds_per_pair_ =
-      0;  // 0 until a shard came back. Guarded by the mutex of the batch.
+  std::vector<std::string> arguments_;           // Of every run of matches_importer.
+  std::vector<VerifiedPair> known_;              // Ascending.
+  std::unique_ptr<ExactMatcher> exact_matcher_;  // None if COLMAP matches.
+  std::vector<ImagePair> unverified_;  // Ascending; their matches are in the database already.
+  bool shards_with_descriptors_ = true;
+
+  // Guarded by the mutex of the batch.
+  double slowest_seconds_per_pair_ = 0;  // 0 until a shard came back.
+  VerifierStatistics statistics_;
   std::set<ImageId>
       failing_images_;  // Of failures since the last success, no image in two of them.
 };

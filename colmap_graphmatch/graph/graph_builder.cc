@@ -1,0 +1,132 @@
+#include "colmap_graphmatch/graph/graph_builder.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/stopwatch.h"
+
+namespace colmap_graphmatch {
+
+GraphBuilder::GraphBuilder(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                           const std::function<void(const LoopProgress&)>& on_progress)
+    : image_ids_(image_ids),
+      verifier_(verifier),
+      on_progress_(on_progress),
+      graph_(image_ids.size()),
+      components_(image_ids.size()) {
+  if (!std::is_sorted(image_ids.begin(), image_ids.end())) {
+    throw OptionsError("The ids of the images must be in ascending order.");
+  }
+}
+
+std::vector<TestedVertexPair> GraphBuilder::KnownOutsideGraph() const {
+  std::vector<TestedVertexPair> pairs;
+  for (const VerifiedPair& known : verifier_.KnownPairs()) {
+    const auto a = std::lower_bound(image_ids_.begin(), image_ids_.end(), known.pair.id1);
+    const auto b = std::lower_bound(a, image_ids_.end(), known.pair.id2);
+    if (b == image_ids_.end() || *a != known.pair.id1 || *b != known.pair.id2 || a == b) {
+      continue;  // An image without features, or one that is gone.
+    }
+    const VertexPair pair(static_cast<Vertex>(a - image_ids_.begin()),
+                          static_cast<Vertex>(b - image_ids_.begin()));
+    if (graph_.IsTested(pair.first, pair.second)) continue;
+    pairs.push_back({pair, known.outcome == PairOutcome::kEdge});
+  }
+  return pairs;
+}
+
+bool GraphBuilder::AddKnown() {
+  const std::vector<TestedVertexPair> seeds = KnownOutsideGraph();
+  for (const TestedVertexPair& seed : seeds) {
+    if (!seed.is_edge) continue;
+    ++result_.num_seed_edges;
+    components_.AddEdge(seed.pair);
+  }
+  result_.num_seed_pairs += seeds.size();
+  graph_.Add(seeds);
+  return !seeds.empty();
+}
+
+StageStatistics& GraphBuilder::Total(LoopStage stage) {
+  switch (stage) {
+    case LoopStage::kSampling:
+      return result_.sampling;
+    case LoopStage::kPropagation:
+      return result_.propagation;
+    case LoopStage::kListed:
+      break;
+  }
+  return result_.listed;
+}
+
+StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
+                                     const std::vector<VertexPair>& pairs,
+                                     double num_future_tests) {
+  StageStatistics batch;
+  if (pairs.empty()) return batch;
+  const Stopwatch stopwatch;
+  std::vector<ImagePair> image_pairs;
+  image_pairs.reserve(pairs.size());
+  for (const VertexPair& pair : pairs) {
+    image_pairs.emplace_back(image_ids_[pair.first], image_ids_[pair.second]);
+  }
+  // Vertices ascend with image ids, so the pairs do too and can be found again by bisection.
+  std::vector<TestedVertexPair> tested;
+  tested.reserve(pairs.size());
+  const StageStatistics before = Total(stage);
+  result_.finished = verifier_.Verify(image_pairs, [&](const VerifiedPair& verified) {
+    const auto place = std::lower_bound(image_pairs.begin(), image_pairs.end(), verified.pair);
+    const VertexPair pair = pairs[static_cast<std::size_t>(place - image_pairs.begin())];
+    const bool is_edge = verified.outcome == PairOutcome::kEdge;
+    if (FindPair(verifier_.KnownPairs(), verified.pair) != nullptr) {
+      ++batch.num_known;
+      if (is_edge) ++batch.num_known_edges;
+    } else if (verified.outcome == PairOutcome::kFailed) {
+      ++batch.num_failed;
+      result_.failed_pairs.push_back(verified.pair);
+    } else {
+      ++batch.num_tested;
+      if (is_edge) ++batch.num_edges;
+    }
+    if (is_edge) components_.AddEdge(pair);
+    tested.push_back({pair, is_edge});
+    batch.seconds = stopwatch.Seconds();
+    Total(stage) = before + batch;
+    Report(stage, iteration, batch.num_edges + batch.num_known_edges,
+           static_cast<double>(pairs.size() - tested.size()) + num_future_tests);
+  });
+  batch.seconds = stopwatch.Seconds();
+  Total(stage) = before + batch;
+  std::sort(
+      tested.begin(), tested.end(),
+      [](const TestedVertexPair& a, const TestedVertexPair& b) { return a.pair < b.pair; });
+  graph_.Add(tested);
+  return batch;
+}
+
+void GraphBuilder::Report(LoopStage stage, int iteration, std::size_t num_edges_in_batch,
+                          double num_remaining_tests) {
+  if (!on_progress_) return;
+  LoopProgress progress;
+  progress.stage = stage;
+  progress.iteration = iteration;
+  progress.all = result_.All();
+  progress.num_edges = graph_.NumEdges() + num_edges_in_batch;
+  progress.num_components = components_.Count();
+  progress.largest_component = components_.Largest();
+  progress.num_isolated = components_.NumIsolated();
+  progress.expected_remaining_tests = static_cast<std::size_t>(num_remaining_tests);
+  on_progress_(progress);
+}
+
+GraphMatchResult GraphBuilder::Finish() {
+  result_.graph = std::move(graph_);
+  result_.num_components = components_.Count();
+  result_.largest_component = components_.Largest();
+  result_.num_isolated = components_.NumIsolated();
+  std::sort(result_.failed_pairs.begin(), result_.failed_pairs.end());
+  return std::move(result_);
+}
+
+}  // namespace colmap_graphmatch

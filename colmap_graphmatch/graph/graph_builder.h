@@ -1,0 +1,53 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/graph/components.h"
+#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/matching_graph.h"
+
+namespace colmap_graphmatch {
+
+// A matching graph that grows batch by batch as a verifier tests pairs, with the statistics of how
+// it came about. The arguments of the constructor must outlive it.
+class GraphBuilder {
+ public:
+  // image_ids: the image of every vertex, ascending. Throws OptionsError if they are not.
+  GraphBuilder(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+               const std::function<void(const LoopProgress&)>& on_progress);
+
+  const MatchingGraph& Graph() const { return graph_; }
+
+  // Adds the known pairs that are not in the graph. Returns true if there were any.
+  bool AddKnown();
+
+  std::size_t NumKnownOutsideGraph() const { return KnownOutsideGraph().size(); }
+
+  // Has the pairs, which are ascending and none of which is in the graph, tested, and adds them.
+  // Returns the statistics of this batch alone.
+  StageStatistics Verify(LoopStage stage, int iteration, const std::vector<VertexPair>& pairs,
+                         double num_future_tests);
+
+  // False once the verifier was asked to stop: nothing more is to be verified.
+  bool Continues() const { return result_.finished; }
+
+  // What was found. The builder is of no use after it.
+  GraphMatchResult Finish();
+
+ private:
+  std::vector<TestedVertexPair> KnownOutsideGraph() const;
+  StageStatistics& Total(LoopStage stage);
+  void Report(LoopStage stage, int iteration, std::size_t num_edges_in_batch,
+              double num_remaining_tests);
+
+  const std::vector<ImageId>& image_ids_;
+  PairVerifier& verifier_;
+  const std::function<void(const LoopProgress&)>& on_progress_;
+  MatchingGraph graph_;
+  Components components_;
+  GraphMatchResult result_;
+};
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/graph/graphmatch.h"
+
+namespace colmap_graphmatch {
+
+// Has pairs tested that are given beforehand instead of found by sampling and propagation: all
+// pairs of the images, block of images by block of images, or those of a list. Pairs that the
+// verifier knows are in the graph from the start and not asked for again. image_ids: ascending;
+// pairs of other images, pairs of an image with itself and repeated pairs are left out.
+// Exceptions of the verifier pass through.
+GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                                const std::function<void(const LoopProgress&)>& on_progress);
+GraphMatchResult VerifyListedPairs(const std::vector<ImagePair>& pairs,
+                                   const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                                   const std::function<void(const LoopProgress&)>& on_progress);
+
+}  // namespace colmap_graphmatch

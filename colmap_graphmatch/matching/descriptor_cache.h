@@ -1,0 +1,104 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/matching/top_two.h"
+
+namespace colmap_graphmatch {
+
+// What matching needs of one image: num x 128 descriptors, row-major.
+struct MatchingFeatures {
+  std::vector<std::uint8_t> descriptors;
+
+  // Those of the largest scales alone, if pairs are tried with these first; empty otherwise.
+  std::vector<std::uint8_t> largest_scales;
+
+  DescriptorView All() const { return View(descriptors); }
+  DescriptorView LargestScales() const { return View(largest_scales); }
+  std::size_t NumBytes() const { return descriptors.size() + largest_scales.size(); }
+
+ private:
+  static DescriptorView View(const std::vector<std::uint8_t>& data) {
+    return {data.data(), data.size() / kDescriptorDim};
+  }
+};
+
+// Features of the images that were used last, bounded in bytes, read by threads of its own. All
+// members are thread-safe.
+class DescriptorCache {
+ public:
+  using Reader = std::function<MatchingFeatures(ImageId)>;
+
+  // max_bytes: of the features kept for reuse; those that somebody holds count on top once they are
+  // no longer kept, so that any bound works, 0 included. make_reader is called once on each of the
+  // num_readers threads, and what it returns on that thread alone.
+  DescriptorCache(std::size_t max_bytes, std::size_t num_readers,
+                  const std::function<Reader()>& make_reader);
+  ~DescriptorCache();
+  DescriptorCache(const DescriptorCache&) = delete;
+  DescriptorCache& operator=(const DescriptorCache&) = delete;
+
+  // Features that are there or on their way.
+  class Handle;
+
+  // Returns at once; the image is read if it is not there.
+  Handle Request(ImageId image);
+
+  // Waits until the features are there. They stay as long as the handle does. Rethrows what the
+  // reader threw; the next request for the image tries again.
+  const MatchingFeatures& Wait(const Handle& handle);
+
+  // Images read so far, and the most bytes that were kept at a time.
+  std::size_t NumReads() const;
+  std::size_t MaxBytesKept() const;
+
+ private:
+  struct Entry {
+    ImageId image = 0;
+    bool ready = false;
+    MatchingFeatures features;
+    std::exception_ptr exception;
+  };
+  using Entries = std::list<std::shared_ptr<Entry>>;
+
+  void Read(const std::function<Reader()>& make_reader);
+  void Keep(const std::shared_ptr<Entry>& entry);
+
+  const std::size_t max_bytes_;
+  mutable std::mutex mutex_;
+  std::condition_variable requested_;
+  std::condition_variable read_;
+  Entries kept_;  // The one used last in front; entries that are not ready are among them.
+  std::unordered_map<ImageId, Entries::iterator> places_;
+  std::deque<std::shared_ptr<Entry>> to_read_;
+  std::size_t bytes_kept_ = 0;
+  std::size_t max_bytes_kept_ = 0;
+  std::size_t num_reads_ = 0;
+  bool closing_ = false;
+  std::vector<std::thread> threads_;
+
+ public:
+  class Handle {
+   private:
+    friend class DescriptorCache;
+    std::shared_ptr<Entry> entry_;
+  };
+};
+
+// A quarter of the memory that this process may use: the machine's, or less if its control group
+// is limited further. In bytes.
+std::size_t DefaultCacheBytes();
+
+}  // namespace colmap_graphmatch

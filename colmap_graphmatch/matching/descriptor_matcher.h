@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "colmap_graphmatch/matching/top_two.h"
+
+namespace colmap_graphmatch {
+
+// COLMAP's SiftMatchingOptions, with its names and defaults (src/colmap/feature/sift.h).
+struct DescriptorMatchingOptions {
+  // A match's angle must be smaller than this times the angle to the second best; greater than 0.
+  double max_ratio = 0.8;
+
+  // Greatest angle of a match, in radians; greater than 0.
+  double max_distance = 0.7;
+
+  // Whether two descriptors must be each other's best, and pass both tests in both directions.
+  bool cross_check = true;
+
+  // Features of an image that are matched at most: its first ones, as COLMAP's GPU matcher takes
+  // them (its CPU matcher takes all); at least 1.
+  int max_num_matches = 32768;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+// A pair of corresponding features, by their rows in the two images; laid out as COLMAP stores it.
+struct FeatureMatch {
+  std::uint32_t feature1 = 0;
+  std::uint32_t feature2 = 0;
+
+  friend bool operator==(const FeatureMatch& a, const FeatureMatch& b) {
+    return a.feature1 == b.feature1 && a.feature2 == b.feature2;
+  }
+};
+static_assert(sizeof(FeatureMatch) == 2 * sizeof(std::uint32_t));
+
+// Exact descriptor matching under COLMAP's rule (FindBestMatchesBruteForce in
+// src/colmap/feature/sift.cc): the angle of two descriptors is acos(product / 512^2), in single
+// precision; a descriptor of the first image and its nearest of the second match if their angle is
+// at most max_distance and less than max_ratio times the angle to the second nearest. Of several
+// that are equally near, the first is the nearest. The result depends on the descriptors and the
+// options alone.
+//
+// Not thread-safe: each thread has its own, which keeps its memory from call to call.
+class DescriptorMatcher {
+ public:
+  explicit DescriptorMatcher(const DescriptorMatchingOptions& options);
+
+  // By ascending feature1. Either image may have no descriptors.
+  std::vector<FeatureMatch> Match(const DescriptorView& image1, const DescriptorView& image2);
+
+ private:
+  bool Passes(std::int32_t best, std::int32_t second) const;
+
+  DescriptorMatchingOptions options_;
+  float max_ratio_;
+  float max_distance_;
+  std::int32_t min_product_;  // A smaller one is farther than max_distance for sure.
+  TopTwoBuffers buffers_;
+  TopTwo top_two_;
+};
+
+}  // namespace colmap_graphmatch

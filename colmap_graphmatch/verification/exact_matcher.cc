@@ -1,0 +1,94 @@
+#include "colmap_graphmatch/verification/exact_matcher.h"
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/largest_scales.h"
+#include "colmap_graphmatch/database/database.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// Pairs whose images are on their way while one is matched: reading an image takes much less time
+// than matching a pair, unless the disk is slow.
+constexpr std::size_t kLookahead = 4;
+
+// A thread that reads keeps up with many that match.
+std::size_t NumReaders(std::size_t num_threads) {
+  return std::clamp<std::size_t>(num_threads / 8, 1, 4);
+}
+
+std::size_t CacheBytes(double cache_gb) {
+  return cache_gb > 0 ? static_cast<std::size_t>(cache_gb * 1e9) : DefaultCacheBytes();
+}
+
+}  // namespace
+
+void ExactMatcherOptions::Check() const {
+  matching.Check();
+  if (!(cache_gb >= 0)) throw OptionsError("cache_gb must be positive, or 0 to have it chosen.");
+  if (preemptive_num_features < 0) {
+    throw OptionsError("preemptive_num_features must be positive, or 0 to match all features.");
+  }
+  if (preemptive_min_matches < 1) {
+    throw OptionsError("preemptive_min_matches must be at least 1.");
+  }
+}
+
+ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
+                           const std::filesystem::path& database_path, double lock_timeout_seconds,
+                           std::size_t num_threads)
+    : options_(options),
+      cache_(CacheBytes(options.cache_gb), NumReaders(num_threads),
+             [this, database_path, lock_timeout_seconds]() -> DescriptorCache::Reader {
+               const auto database = std::make_shared<Database>(
+                   database_path, sqlite::Access::kRead, lock_timeout_seconds);
+               return [this, database](ImageId image) {
+                 return ReadFeatures(database.get(), image);
+               };
+             }) {}
+
+MatchingFeatures ExactMatcher::ReadFeatures(Database* database, ImageId image) const {
+  Descriptors descriptors = database->ReadDescriptors(image);
+  MatchingFeatures features;
+  if (options_.preemptive_num_features > 0) {
+    features.largest_scales = descriptors.CopyRows(
+        SelectLargestScales(database->ReadKeypoints(image).Scales(descriptors.num_rows),
+                            static_cast<std::size_t>(options_.preemptive_num_features)));
+  }
+  features.descriptors = std::move(descriptors.data);
+  return features;
+}
+
+bool ExactMatcher::Match(const std::vector<ImagePair>& pairs,
+                         const std::function<bool()>& should_stop,
+                         std::vector<std::vector<FeatureMatch>>* matches) {
+  DescriptorMatcher matcher(options_.matching);
+  std::deque<std::pair<DescriptorCache::Handle, DescriptorCache::Handle>> requested;
+  const auto min_matches = static_cast<std::size_t>(options_.preemptive_min_matches);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (should_stop()) return false;
+    for (; next < std::min(i + kLookahead, pairs.size()); ++next) {
+      requested.emplace_back(cache_.Request(pairs[next].id1), cache_.Request(pairs[next].id2));
+    }
+    const auto [handle1, handle2] = std::move(requested.front());
+    requested.pop_front();
+    const MatchingFeatures& features1 = cache_.Wait(handle1);
+    const MatchingFeatures& features2 = cache_.Wait(handle2);
+    ++num_pairs_;
+    if (options_.preemptive_num_features > 0 &&
+        matcher.Match(features1.LargestScales(), features2.LargestScales()).size() < min_matches) {
+      ++num_preempted_;
+      matches->emplace_back();
+      continue;
+    }
+    matches->push_back(matcher.Match(features1.All(), features2.All()));
+  }
+  return true;
+}
+
+}  // namespace colmap_graphmatch

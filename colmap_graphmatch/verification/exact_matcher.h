@@ -1,0 +1,62 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/matching/descriptor_cache.h"
+#include "colmap_graphmatch/matching/descriptor_matcher.h"
+
+namespace colmap_graphmatch {
+
+struct ExactMatcherOptions {
+  DescriptorMatchingOptions matching;
+
+  // Descriptors kept in memory, in units of 10^9 bytes; 0: a quarter of the memory. What does not
+  // fit is read again, with the same result.
+  double cache_gb = 0;
+
+  // Match this many features of the largest scales first, and take a pair for unmatched if fewer
+  // than preemptive_min_matches of them match (Wu, Towards Linear-Time Incremental Structure from
+  // Motion, 3DV 2013, section 3.1). 0: match all features of every pair. Faster, and loses weak
+  // edges (docs/benchmarks.md).
+  int preemptive_num_features = 0;
+  int preemptive_min_matches = 4;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+// Matches the descriptors of pairs of images of a database. Thread-safe.
+class ExactMatcher {
+ public:
+  // num_threads: how many will call Match at a time. Nothing is read yet.
+  ExactMatcher(const ExactMatcherOptions& options, const std::filesystem::path& database_path,
+               double lock_timeout_seconds, std::size_t num_threads);
+
+  // The matches of every pair, on the calling thread alone, while the images of the pairs that come
+  // next are read. Returns false if should_stop, which is asked before every pair, ended it early.
+  // Throws DatabaseError.
+  bool Match(const std::vector<ImagePair>& pairs, const std::function<bool()>& should_stop,
+             std::vector<std::vector<FeatureMatch>>* matches);
+
+  // Pairs matched so far, and those of them that the largest scales alone ruled out.
+  std::size_t NumPairs() const { return num_pairs_; }
+  std::size_t NumPreempted() const { return num_preempted_; }
+
+  // Images read from the database so far; some more than once if the cache is small.
+  std::size_t NumReads() const { return cache_.NumReads(); }
+
+ private:
+  MatchingFeatures ReadFeatures(class Database* database, ImageId image) const;
+
+  ExactMatcherOptions options_;
+  DescriptorCache cache_;
+  std::atomic<std::size_t> num_pairs_{0};
+  std::atomic<std::size_t> num_preempted_{0};
+};
+
+}  // namespace colmap_graphmatch
