@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <unordered_map>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/graph/components.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/listed_pairs.h"
 #include "colmap_graphmatch/graph/propagation.h"
 #include "colmap_graphmatch/graph/sampling.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
@@ -641,6 +643,64 @@ TEST(Loop, NeedsAnIdForEveryImage) {
   ThreadPool threads(1);
   EXPECT_THROW(RunGraphMatch({}, ranking, {1, 2}, verifier, threads, nullptr), OptionsError);
   EXPECT_THROW(RunGraphMatch({}, ranking, {4, 3, 2, 1}, verifier, threads, nullptr), OptionsError);
+}
+
+TEST(ListedPairs, AllPairsOfTheImagesInBlocks) {
+  // Three blocks of 256 images at most.
+  std::vector<ImageId> ids;
+  for (ImageId i = 0; i < 600; ++i) ids.push_back(3 * i + 1);
+  RecordingVerifier verifier({ImagePair(1, 4), ImagePair(4, 1795)});
+  verifier.known = {ImagePair(1, 4), ImagePair(1, 7), ImagePair(2, 3)};
+  std::size_t last_remaining = 0;
+  std::size_t calls = 0;
+  const GraphMatchResult result = VerifyAllPairs(ids, verifier, [&](const LoopProgress& progress) {
+    EXPECT_EQ(progress.stage, LoopStage::kListed);
+    EXPECT_EQ(progress.expected_remaining_tests + ++calls, 600U * 599 / 2 - 2);
+    last_remaining = progress.expected_remaining_tests;
+  });
+  EXPECT_EQ(last_remaining, 0U);
+  EXPECT_EQ(verifier.tested.size(), 600U * 599 / 2 - 2);
+  EXPECT_EQ(std::set<ImagePair>(verifier.tested.begin(), verifier.tested.end()).size(),
+            verifier.tested.size());
+  EXPECT_EQ(verifier.batches.size(), 6U);
+  EXPECT_EQ(result.num_seed_pairs, 2U);
+  EXPECT_EQ(result.num_seed_edges, 1U);
+  EXPECT_EQ(result.listed.num_tested, verifier.tested.size());
+  EXPECT_EQ(result.graph.NumEdges(), 2U);
+  EXPECT_EQ(result.num_components, 1U);
+  EXPECT_EQ(result.largest_component, 3U);
+  EXPECT_EQ(result.num_isolated, 597U);
+  EXPECT_TRUE(result.finished);
+}
+
+TEST(ListedPairs, NoImagesOrOne) {
+  RecordingVerifier verifier({});
+  EXPECT_TRUE(VerifyAllPairs({}, verifier, nullptr).finished);
+  EXPECT_EQ(VerifyAllPairs({5}, verifier, nullptr).num_isolated, 1U);
+  EXPECT_THAT(verifier.tested, IsEmpty());
+}
+
+TEST(ListedPairs, StopsBetweenBlocks) {
+  std::vector<ImageId> ids(600);
+  std::iota(ids.begin(), ids.end(), ImageId{1});
+  RecordingVerifier verifier({});
+  verifier.stop_after = 40000;
+  EXPECT_FALSE(VerifyAllPairs(ids, verifier, nullptr).finished);
+  EXPECT_EQ(verifier.tested.size(), 40000U);
+  EXPECT_EQ(verifier.batches.size(), 2U);
+}
+
+TEST(ListedPairs, ThoseOfAList) {
+  RecordingVerifier verifier({ImagePair(2, 5)});
+  verifier.known = {ImagePair(2, 9)};
+  // Twice, known, of an image with itself, and of an image that is not there.
+  const std::vector<ImagePair> list = {ImagePair(9, 5), ImagePair(5, 2), ImagePair(2, 5),
+                                       ImagePair(9, 2), ImagePair(5, 5), ImagePair(2, 7)};
+  const GraphMatchResult result = VerifyListedPairs(list, {2, 5, 9}, verifier, nullptr);
+  EXPECT_THAT(verifier.batches, ElementsAre(ElementsAre(ImagePair(2, 5), ImagePair(5, 9))));
+  EXPECT_EQ(result.listed.num_tested, 2U);
+  EXPECT_EQ(result.listed.num_edges, 1U);
+  EXPECT_EQ(result.num_seed_pairs, 1U);
 }
 
 TEST(ReplayVerifier, AnswersFromTheGraph) {

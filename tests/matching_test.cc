@@ -21,6 +21,7 @@
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/matching/descriptor_cache.h"
 #include "colmap_graphmatch/matching/descriptor_matcher.h"
+#include "colmap_graphmatch/matching/pair_order.h"
 #include "colmap_graphmatch/matching/top_two.h"
 #include "tests/support/reference_matching.h"
 
@@ -34,7 +35,6 @@ namespace {
 
 using ::testing::Each;
 using ::testing::ElementsAre;
-using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::ValuesIn;
 
@@ -218,7 +218,8 @@ TEST_P(MatchingTest, MatchesNearTheThresholds) {
   for (int offset = -300; offset < 300; ++offset) {
     Rows a(kDescriptorDim, 0);
     Rows b(kDescriptorDim, 0);
-    for (int d = 0; d < base; ++d) a[static_cast<std::size_t>(d)] = b[static_cast<std::size_t>(d)] = 255;
+    for (int d = 0; d < base; ++d)
+      a[static_cast<std::size_t>(d)] = b[static_cast<std::size_t>(d)] = 255;
     int rest = static_cast<int>(threshold) + offset - base * 255 * 255;
     for (std::size_t d = 64; rest > 0; ++d) {
       const int part = std::min(rest, 255);
@@ -341,6 +342,44 @@ TEST(DescriptorCache, CanBeClosedWhileImagesAreOnTheirWay) {
 
 TEST(DescriptorCache, TheDefaultIsAShareOfTheMemory) {
   EXPECT_GT(DefaultCacheBytes(), std::size_t{10} << 20);
+}
+
+// Image reads of a cache with room for so many images, if the pairs come in this order.
+std::size_t CountReads(const std::vector<ImagePair>& pairs, std::size_t room) {
+  MatchingFeatures features;
+  features.descriptors.assign(kDescriptorDim, 1);
+  DescriptorCache cache(room * kDescriptorDim, 1,
+                        [&] { return [&](ImageId) { return features; }; });
+  for (const ImagePair& pair : pairs) {
+    cache.Wait(cache.Request(pair.id1));
+    cache.Wait(cache.Request(pair.id2));
+  }
+  return cache.NumReads();
+}
+
+TEST(PairOrder, ReusesImagesWhateverTheSizeOfTheCache) {
+  std::vector<ImagePair> pairs;
+  for (ImageId a = 1; a <= 128; ++a) {
+    for (ImageId b = a + 1; b <= 128; ++b) pairs.emplace_back(a, b);
+  }
+  std::vector<ImagePair> sorted = pairs;
+  SortForReuse(&sorted);
+  EXPECT_TRUE(std::is_permutation(sorted.begin(), sorted.end(), pairs.begin()));
+  // A square of n x n pairs needs 2 n reads.
+  for (const std::size_t room : {8U, 16U, 32U, 64U}) {
+    const double reads = static_cast<double>(CountReads(sorted, room));
+    EXPECT_LT(reads / static_cast<double>(pairs.size()), 5.0 / static_cast<double>(room))
+        << "room for " << room;
+    EXPECT_LT(reads, 0.7 * static_cast<double>(CountReads(pairs, room)));
+  }
+}
+
+TEST(PairOrder, AnyIds) {
+  std::vector<ImagePair> pairs = {
+      {2147483646, 3}, {1, 2147483645}, {1, 2}, {2147483646, 2147483645}};
+  SortForReuse(&pairs);
+  EXPECT_THAT(pairs, ElementsAre(ImagePair(1, 2), ImagePair(1, 2147483645),
+                                 ImagePair(3, 2147483646), ImagePair(2147483645, 2147483646)));
 }
 
 }  // namespace

@@ -65,6 +65,8 @@ class VerifierTest : public ::testing::Test {
     const bool complete = verifier.Verify(pairs, [this](const VerifiedPair& pair) {
       EXPECT_TRUE(outcomes_.emplace(pair.pair, pair.outcome).second);
     });
+    statistics_ = verifier.Statistics();
+    matched_here_ = verifier.MatchesHere();
     EXPECT_THAT(ShardDirectories(work.Path()), IsEmpty());
     return complete;
   }
@@ -102,6 +104,8 @@ class VerifierTest : public ::testing::Test {
   ColmapVerifierOptions options_;
   StopRequest stop_;
   std::map<ImagePair, PairOutcome> outcomes_;
+  VerifierStatistics statistics_;
+  bool matched_here_ = false;
   std::vector<std::string> warnings_;
 };
 
@@ -275,6 +279,176 @@ TEST_F(VerifierTest, EdgesFollowMinNumInliers) {
   options_.min_num_inliers = 21;  // The test double finds 20.
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kNoEdge);
+}
+
+// Five images of 30 features at each of five places, whose descriptors match within a place.
+class ExactMatcherTest : public VerifierTest {
+ protected:
+  void SetUp() override {
+    VerifierTest::SetUp();
+    options_.matcher = ColmapVerifierOptions::Matcher::kExact;
+  }
+
+  static bool SamePlace(const ImagePair& pair) { return (pair.id1 - 1) / 5 == (pair.id2 - 1) / 5; }
+
+  std::string Dump() const {
+    Database database(database_path_, sqlite::Access::kRead, 5);
+    sqlite::Connection connection(database_path_, sqlite::Access::kRead, 5);
+    std::string text;
+    for (const char* table : {"matches", "two_view_geometries"}) {
+      sqlite::Statement select(connection, std::string("SELECT pair_id, rows, hex(data) FROM ") +
+                                               table + " ORDER BY pair_id");
+      while (select.Step()) {
+        text += std::to_string(select.Int(0)) + " " + std::to_string(select.Int(1)) + " " +
+                select.Text(2) + "\n";
+      }
+    }
+    return text;
+  }
+
+  void Clear() {
+    outcomes_.clear();
+    std::filesystem::remove(directory_.Path() / "log.txt");
+    sqlite::Connection connection(database_path_, sqlite::Access::kReadWrite, 5);
+    connection.Execute("DELETE FROM two_view_geometries");
+    connection.Execute("DELETE FROM matches");
+  }
+};
+
+TEST_F(ExactMatcherTest, ColmapOnlyGetsPairsWithEnoughMatches) {
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  EXPECT_TRUE(matched_here_);
+  ASSERT_THAT(outcomes_, SizeIs(300));
+  for (const auto& [pair, outcome] : outcomes_) {
+    EXPECT_EQ(outcome,
+              SamePlace(pair) && IsFakeEdge(pair) ? PairOutcome::kEdge : PairOutcome::kNoEdge);
+  }
+  EXPECT_EQ(CountInLog("pair"), 50U);
+  EXPECT_EQ(CountInLog("given"), 50U);
+  EXPECT_EQ(CountInLog("descriptors of 0 images"), CountInLog("run"));
+  EXPECT_THAT(Log(), Contains("given 1 2: 30"));
+  EXPECT_EQ(statistics_.num_matched, 300U);
+  EXPECT_EQ(statistics_.num_unmatched, 250U);
+  EXPECT_EQ(statistics_.num_preempted, 0U);
+  EXPECT_EQ(statistics_.num_image_reads, 25U);
+}
+
+TEST_F(ExactMatcherTest, UnmatchedPairsGetTheRowsOfColmap) {
+  EXPECT_TRUE(Verify({ImagePair(1, 6)}));
+  sqlite::Connection connection(database_path_, sqlite::Access::kRead, 5);
+  sqlite::Statement matches(connection, "SELECT rows, cols, data FROM matches");
+  ASSERT_TRUE(matches.Step());
+  EXPECT_EQ(matches.Int(0), 0);
+  EXPECT_EQ(matches.Int(1), 2);
+  EXPECT_TRUE(matches.IsNull(2));
+  sqlite::Statement geometry(
+      connection, "SELECT rows, cols, data, config, F, E, H, qvec, tvec FROM two_view_geometries");
+  ASSERT_TRUE(geometry.Step());
+  EXPECT_EQ(geometry.Int(0), 0);
+  EXPECT_EQ(geometry.Int(1), 2);
+  EXPECT_EQ(geometry.Int(3), 0);
+  for (const int column : {2, 4, 5, 6, 7, 8}) EXPECT_TRUE(geometry.IsNull(column)) << column;
+}
+
+TEST_F(ExactMatcherTest, TheResultDependsOnNeitherTheCacheNorTheThreads) {
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  const std::string expected = Dump();
+  for (const int num_threads : {1, 3, 16}) {
+    Clear();
+    options_.num_threads = num_threads;
+    options_.exact.cache_gb = 1e-9;  // One byte: nothing is kept.
+    EXPECT_TRUE(Verify(AllPairs(25)));
+    EXPECT_EQ(Dump(), expected) << num_threads << " threads";
+    EXPECT_GT(statistics_.num_image_reads, 100U);
+  }
+}
+
+TEST_F(ExactMatcherTest, MatchingFollowsTheOptions) {
+  options_.exact.matching.max_distance = 0.001;
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  EXPECT_EQ(CountInLog("pair"), 0U);
+  EXPECT_EQ(statistics_.num_unmatched, 300U);
+}
+
+TEST_F(ExactMatcherTest, PairsWithTooFewMatchesOfTheLargestScalesAreGivenUp) {
+  options_.exact.preemptive_num_features = 10;
+  options_.exact.preemptive_min_matches = 1;
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  EXPECT_EQ(statistics_.num_matched, 300U);
+  EXPECT_EQ(statistics_.num_preempted, 250U);
+  EXPECT_EQ(CountInLog("pair"), 50U);
+  Clear();
+  options_.exact.preemptive_min_matches = 11;  // More than there are.
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  EXPECT_EQ(statistics_.num_preempted, 300U);
+  EXPECT_EQ(CountInLog("pair"), 0U);
+}
+
+TEST_F(ExactMatcherTest, MatchesThatAwaitVerificationAreVerifiedAsTheyAre) {
+  sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
+      .Execute("INSERT INTO matches VALUES(2147483647 * 1 + 6, 1, 2, x'0000000000000000')");
+  EXPECT_TRUE(Verify({ImagePair(1, 2), ImagePair(1, 6)}));
+  EXPECT_THAT(Log(), Contains("given 1 2: 30"));
+  EXPECT_THAT(Log(), Contains("given 1 6: 1"));
+  EXPECT_EQ(statistics_.num_matched, 1U);
+}
+
+TEST_F(ExactMatcherTest, GuidedMatchingNeedsDescriptors) {
+  options_.colmap_options = {{"guided_matching", "1"}};
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_THAT(Log(), Contains("descriptors of 2 images"));
+}
+
+TEST_F(ExactMatcherTest, AutoMatchesHereUnlessColmapHasAGpu) {
+  options_.matcher = ColmapVerifierOptions::Matcher::kAuto;
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_TRUE(matched_here_);
+  Set("FAKE_COLMAP_VERSION", "COLMAP 3.10\n(Commit x on y with CUDA)");
+  Set("FAKE_COLMAP_SCHEMA", "310");
+  outcomes_.clear();
+  EXPECT_TRUE(Verify({ImagePair(1, 3)}));
+  EXPECT_FALSE(matched_here_);
+  options_.use_gpu = false;
+  outcomes_.clear();
+  EXPECT_TRUE(Verify({ImagePair(1, 4)}));
+  EXPECT_TRUE(matched_here_);
+  // COLMAP only verifies, for which it has no use for a GPU.
+  options_.use_gpu = true;
+  options_.matcher = ColmapVerifierOptions::Matcher::kExact;
+  outcomes_.clear();
+  EXPECT_TRUE(Verify({ImagePair(1, 5)}));
+  EXPECT_TRUE(matched_here_);
+  EXPECT_THAT(Log().back(), HasSubstr("1 5"));
+  EXPECT_EQ(CountInLog("run"), 4U);
+  EXPECT_THAT(Log()[Log().size() - 4], HasSubstr("use_gpu=0"));
+}
+
+TEST_F(ExactMatcherTest, ACrashOfColmapLosesOnePair) {
+  Set("FAKE_COLMAP_FAULT", "crash");
+  Set("FAKE_COLMAP_FAULT_PAIR", "3 4");
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  EXPECT_EQ(outcomes_.at(ImagePair(3, 4)), PairOutcome::kFailed);
+  EXPECT_THAT(InDatabase(), SizeIs(299));
+}
+
+TEST_F(ExactMatcherTest, UnmatchedPairsDoNotHideThatColmapFails) {
+  Set("FAKE_COLMAP_FAULT", "exit");
+  Set("FAKE_COLMAP_FAULT_PAIR", "all");
+  EXPECT_THROW(Verify(AllPairs(25)), ColmapError);
+}
+
+TEST_F(ExactMatcherTest, WrongOptions) {
+  options_.exact.cache_gb = -1;
+  EXPECT_THROW(options_.Check(), OptionsError);
+  options_.exact.cache_gb = 0;
+  options_.exact.preemptive_num_features = -1;
+  EXPECT_THROW(options_.Check(), OptionsError);
+  options_.exact.preemptive_num_features = 100;
+  options_.exact.preemptive_min_matches = 0;
+  EXPECT_THROW(options_.Check(), OptionsError);
+  options_.exact.preemptive_min_matches = 1;
+  options_.exact.matching.max_ratio = 0;
+  EXPECT_THROW(options_.Check(), OptionsError);
 }
 
 class DetectTest : public VerifierTest {

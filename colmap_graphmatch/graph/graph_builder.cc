@@ -98,9 +98,8 @@ StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
   });
   batch.seconds = stopwatch.Seconds();
   Total(stage) = before + batch;
-  std::sort(
-      tested.begin(), tested.end(),
-      [](const TestedVertexPair& a, const TestedVertexPair& b) { return a.pair < b.pair; });
+  std::sort(tested.begin(), tested.end(),
+            [](const TestedVertexPair& a, const TestedVertexPair& b) { return a.pair < b.pair; });
   graph_.Add(tested);
   return batch;
 }

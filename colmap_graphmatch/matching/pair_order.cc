@@ -15,7 +15,9 @@ std::uint64_t Spread(std::uint64_t id) {
   return (id | id << 1) & 0x5555555555555555ull;
 }
 
-std::uint64_t PlaceOnCurve(const ImagePair& pair) { return Spread(pair.id1) << 1 | Spread(pair.id2); }
+std::uint64_t PlaceOnCurve(const ImagePair& pair) {
+  return Spread(pair.id1) << 1 | Spread(pair.id2);
+}
 
 }  // namespace
 

@@ -19,9 +19,9 @@ struct PairList {
 };
 
 // Reads a list of image pairs as COLMAP's matches_importer takes it: two names a line, with a space
-// (or a tab) between them; empty lines and those that begin with # are comments. Names may contain spaces
-// (there, COLMAP fails) as long as only one way to cut the line in two gives two images. Throws
-// FileError if the file cannot be read, or if a line can be cut in several ways.
+// (or a tab) between them; empty lines and those that begin with # are comments. Names may contain
+// spaces (there, COLMAP fails) as long as only one way to cut the line in two gives two images.
+// Throws FileError if the file cannot be read, or if a line can be cut in several ways.
 PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
 
 }  // namespace colmap_graphmatch

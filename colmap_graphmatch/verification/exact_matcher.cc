@@ -46,9 +46,8 @@ ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
              [this, database_path, lock_timeout_seconds]() -> DescriptorCache::Reader {
                const auto database = std::make_shared<Database>(
                    database_path, sqlite::Access::kRead, lock_timeout_seconds);
-               return [this, database](ImageId image) {
-                 return ReadFeatures(database.get(), image);
-               };
+               return
+                   [this, database](ImageId image) { return ReadFeatures(database.get(), image); };
              }) {}
 
 MatchingFeatures ExactMatcher::ReadFeatures(Database* database, ImageId image) const {

@@ -24,7 +24,7 @@ struct ExactMatcherOptions {
   // Motion, 3DV 2013, section 3.1). 0: match all features of every pair. Faster, and loses weak
   // edges (docs/benchmarks.md).
   int preemptive_num_features = 0;
-  int preemptive_min_matches = 4;
+  int preemptive_min_matches = 2;
 
   // Throws OptionsError.
   void Check() const;

@@ -1,7 +1,7 @@
-// benchmark_kernel [FEATURES [RUNS]]: how near exact matching comes to what a core can do. First the
-// peak rates of its multiply-add instructions, measured here, then those of ComputeTopTwo with every
-// instruction set, for FEATURES x FEATURES descriptors (5,800), the top two of rows and columns
-// included. Medians of RUNS (5) runs; peaks and kernels take turns.
+// benchmark_kernel [FEATURES [RUNS]]: how near exact matching comes to what a core can do. First
+// the peak rates of its multiply-add instructions, measured here, then those of ComputeTopTwo with
+// every instruction set, for FEATURES x FEATURES descriptors (5,800), the top two of rows and
+// columns included. Medians of RUNS (5) runs; peaks and kernels take turns.
 
 #include <fmt/format.h>
 
@@ -34,7 +34,7 @@ struct Peak {
 
 #if HWY_ARCH_X86
 #define GRAPHMATCH_REPEAT_12(f) f(0) f(1) f(2) f(3) f(4) f(5) f(6) f(7) f(8) f(9) f(10) f(11)
-#define GRAPHMATCH_LOOP(instruction)                                                   \
+#define GRAPHMATCH_LOOP(instruction) \
   asm volatile("1:\n\t" GRAPHMATCH_REPEAT_12(instruction) "dec %0\n\t"                 \
                                                           "jnz 1b"                     \
                : "+r"(num)                                                             \
@@ -42,11 +42,11 @@ struct Peak {
                : "cc", "xmm0", "xmm1", "xmm2", "xmm3", "xmm4", "xmm5", "xmm6", "xmm7", \
                  "xmm8", "xmm9", "xmm10", "xmm11", "xmm12", "xmm13", "xmm15")
 #define GRAPHMATCH_FMA(k) "vfmadd231ps %%ymm12, %%ymm13, %%ymm" #k "\n\t"
-#define GRAPHMATCH_MADD(k)                  \
-  "vpmaddwd %%ymm12, %%ymm13, %%ymm15\n\t"  \
+#define GRAPHMATCH_MADD(k)                 \
+  "vpmaddwd %%ymm12, %%ymm13, %%ymm15\n\t" \
   "vpaddd %%ymm15, %%ymm" #k ", %%ymm" #k "\n\t"
-#define GRAPHMATCH_WIDE_MADD(k)             \
-  "vpmaddwd %%zmm12, %%zmm13, %%zmm15\n\t"  \
+#define GRAPHMATCH_WIDE_MADD(k)            \
+  "vpmaddwd %%zmm12, %%zmm13, %%zmm15\n\t" \
   "vpaddd %%zmm15, %%zmm" #k ", %%zmm" #k "\n\t"
 #define GRAPHMATCH_DOT(k) "vpdpbusd %%zmm12, %%zmm13, %%zmm" #k "\n\t"
 

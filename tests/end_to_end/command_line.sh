@@ -22,6 +22,11 @@ expect_exit 1 'must be one of carry, floor, round' "${run[@]}" --GraphMatching.s
 expect_exit 1 'must be a number' "${run[@]}" --SiftMatching.max_ratio zero
 expect_exit 1 'the same option with different values' "${run[@]}" --SiftMatching.max_error 4 \
   --TwoViewGeometry.max_error 5
+expect_exit 1 'must be one of auto, colmap, exact' "${run[@]}" --GraphMatching.matcher gpu
+expect_exit 1 'cache_gb must be positive' "${run[@]}" --GraphMatching.cache_gb -1
+expect_exit 1 'max_ratio must be greater than 0' "${run[@]}" --SiftMatching.max_ratio 0
+expect_exit 1 'contradict each other' "${run[@]}" --GraphMatching.strategy exhaustive \
+  --GraphMatching.match_list_path "$work/pairs.txt"
 expect_exit 1 'must be at least 1, or -1' "${run[@]}" --SiftMatching.num_threads 0
 
 echo "== Wrong databases, programs and directories"
@@ -70,6 +75,37 @@ for option in --SiftMatching.num_threads --FeatureMatching.num_threads; do
     "$option" 5
   tested_pairs "$work/threads.db" | cmp - "$work/undisturbed.txt"
 done
+
+echo "== Who matches makes no difference to what is tested, if both find the same"
+cp "$work/untouched.db" "$work/matcher.db"
+expect_exit 0 'Descriptors are matched by COLMAP' "$matcher" --database_path "$work/matcher.db" \
+  --colmap_path "$fake" --GraphMatching.matcher colmap
+(($(count_tested "$work/matcher.db") > 100)) || fail "too few pairs"
+cp "$work/untouched.db" "$work/cache.db"
+expect_exit 0 'Descriptors are matched exactly' "$matcher" --database_path "$work/cache.db" \
+  --colmap_path "$fake" --GraphMatching.cache_gb 0.000001
+tested_pairs "$work/cache.db" | cmp - "$work/undisturbed.txt"
+
+echo "== All pairs, and those of a list"
+cp "$work/untouched.db" "$work/exhaustive.db"
+expect_exit 0 'Pairs tested       780 of 780' "$matcher" --database_path "$work/exhaustive.db" \
+  --colmap_path "$fake" --GraphMatching.strategy exhaustive
+check_integrity "$work/exhaustive.db"
+expect_exit 0 'Pairs tested       0 of 780' "$matcher" --database_path "$work/exhaustive.db" \
+  --colmap_path "$fake" --GraphMatching.strategy exhaustive
+cp "$work/untouched.db" "$work/listed.db"
+cat >"$work/pairs.txt" <<END
+# two names a line
+place0/photo 0.jpg place0/photo 1.jpg
+place1/photo 3.jpg place0/photo 1.jpg
+place1/photo 3.jpg no/photo.jpg
+END
+expect_exit 5 'Cannot read the list' "$matcher" --database_path "$work/listed.db" \
+  --colmap_path "$fake" --GraphMatching.match_list_path "$work/none.txt"
+expect_exit 0 'Pairs tested       2 of 780' "$matcher" --database_path "$work/listed.db" \
+  --colmap_path "$fake" --GraphMatching.match_list_path "$work/pairs.txt"
+grep -q '1 lines of .* skipped; the first is "place1/photo 3.jpg no/photo.jpg"' "$work/output.txt" ||
+  fail "a line that names no pair was not mentioned"
 
 echo "== One pair that COLMAP crashes on"
 cp "$work/untouched.db" "$work/crash.db"

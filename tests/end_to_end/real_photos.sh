@@ -52,8 +52,7 @@ recall() {
     }' "$work/scenes.tsv" "$photos/dev.edges.tsv" "$work/edges.tsv"
 }
 
-# check DATABASE: nothing was lost, and nothing is left to do. Not the same pairs to the last: COLMAP's CPU
-# matching is randomised.
+# check DATABASE: nothing was lost, and nothing is left to do.
 check() {
   check_integrity "$1"
   local found
@@ -67,6 +66,40 @@ echo "== An undisturbed run"
 cp "$work/features.db" "$work/undisturbed.db"
 "$matcher" --database_path "$work/undisturbed.db" | tee "$work/undisturbed.txt"
 check "$work/undisturbed.db"
+
+# All that was found: matches, inliers and matrices.
+content() {
+  sqlite3 "$1" 'SELECT pair_id, rows, hex(data) FROM matches ORDER BY 1;
+    SELECT pair_id, rows, hex(data), config, hex(F), hex(E), hex(H) FROM two_view_geometries ORDER BY 1'
+}
+
+echo "== The same to the last bit on another number of threads, with a cache for two images"
+content "$work/undisturbed.db" >"$work/undisturbed.content"
+cp "$work/features.db" "$work/threads.db"
+"$matcher" --database_path "$work/threads.db" --SiftMatching.num_threads 3 \
+  --GraphMatching.cache_gb 0.0003 | grep 'Exact matching'
+content "$work/threads.db" | cmp - "$work/undisturbed.content" || fail "another result"
+
+echo "== Pairs with too few matches have the rows that COLMAP writes"
+cp "$work/features.db" "$work/unmatched.db"
+sqlite3 -separator ' ' "$work/undisturbed.db" "SELECT a.name, b.name FROM matches m
+  JOIN images a ON a.image_id = m.pair_id / 2147483647
+  JOIN images b ON b.image_id = m.pair_id % 2147483647
+  WHERE m.rows = 0 ORDER BY m.pair_id LIMIT 20" >"$work/unmatched.txt"
+options=$(colmap matches_importer -h 2>&1)
+colmap matches_importer --database_path "$work/unmatched.db" --match_list_path "$work/unmatched.txt" \
+  --match_type pairs "$(spelling use_gpu)" 0 >"$work/unmatched.log" 2>&1
+rows() {
+  for table in matches two_view_geometries; do
+    columns=$(sqlite3 "$1" "SELECT group_concat('quote(' || name || ')', ', ') FROM pragma_table_info('$table')")
+    sqlite3 "$1" "SELECT $columns FROM $table WHERE pair_id IN (SELECT pair_id FROM matches WHERE rows = 0)
+      ORDER BY pair_id"
+  done
+}
+rows "$work/unmatched.db" >"$work/colmap.rows"
+(($(wc -l <"$work/colmap.rows") >= 30)) || fail "COLMAP matched what was not matched here"
+rows "$work/undisturbed.db" | grep -F -x -f "$work/colmap.rows" | cmp - "$work/colmap.rows" ||
+  fail "rows unlike COLMAP's"
 
 echo "== COLMAP killed while it works, then Ctrl-C, then the same command again"
 cp "$work/features.db" "$work/disturbed.db"
@@ -93,6 +126,7 @@ check_integrity "$work/disturbed.db"
 echo "interrupted at $(count_tested "$work/disturbed.db") pairs"
 expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/disturbed.db"
 check "$work/disturbed.db"
+content "$work/disturbed.db" | cmp - "$work/undisturbed.content" || fail "another result after a disturbance"
 
 echo "== The mapper"
 mkdir "$work/sparse"

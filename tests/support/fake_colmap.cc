@@ -100,6 +100,11 @@ int ImportMatches(const std::map<std::string, std::string>& options) {
   sqlite::Statement images(database, "SELECT name, image_id FROM images");
   while (images.Step()) ids[images.Text(0)] = static_cast<ImageId>(images.Int(1));
 
+  sqlite::Statement descriptors(database, "SELECT count(*) FROM descriptors");
+  descriptors.Step();
+  Log("descriptors of " + std::to_string(descriptors.Int(0)) + " images");
+  sqlite::Statement given(database, "SELECT rows FROM matches WHERE pair_id = ?1");
+
   std::ifstream list(options.at("--match_list_path"));
   std::string name1;
   std::string name2;
@@ -107,6 +112,9 @@ int ImportMatches(const std::map<std::string, std::string>& options) {
     const ImagePair pair(ids.at(name1), ids.at(name2));
     const std::string text = std::to_string(pair.id1) + " " + std::to_string(pair.id2);
     std::this_thread::sleep_for(std::chrono::milliseconds(delay));
+    given.Bind(1, static_cast<std::int64_t>(EncodePair(pair)));
+    if (given.Step()) Log("given " + text + ": " + std::to_string(given.Int(0)));
+    given.Reset();
     bool nonsense = false;
     if (!fault.empty() &&
         (text == fault_pair || fault_pair == "all" || pair.id1 == fault_image ||

@@ -1,0 +1,35 @@
+#!/bin/bash
+# brute_force.sh BUILD_DIR WORK_DIR COLMAP: the matches of the exact matcher and those of the brute-force
+# matcher of a COLMAP of 3.12 or later, for all pairs of some photos, row by row.
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "$0")/common.sh"
+colmap4=${3:?the path of a COLMAP with --SiftMatching.cpu_brute_force_matcher}
+
+photos=${GRAPHMATCH_PHOTOS:-$root/../shared/photos}
+mkdir "$work/images"
+if [[ -f $photos/dev.scenes.tsv ]]; then
+  awk -F '\t' '$2 ~ /^(entry|fountain)$/ { print $1 }' "$photos/dev.scenes.tsv" |
+    while read -r name; do cp "$photos/dev/$name" "$work/images/"; done
+else
+  "$build/tests/synthetic_photos/render_photos" --output_path "$work/rendered" >/dev/null
+  find "$work/rendered" -name '*.jpg' | sort | head -n 20 | xargs -I {} cp {} "$work/images/"
+fi
+colmap feature_extractor --database_path "$work/exact.db" --image_path "$work/images" \
+  --SiftExtraction.use_gpu 0 --SiftExtraction.max_num_features 1500 >"$work/extraction.log" 2>&1
+cp "$work/exact.db" "$work/brute_force.db"
+
+"$matcher" --database_path "$work/exact.db" --GraphMatching.strategy exhaustive \
+  --GraphMatching.matcher exact
+"$colmap4" exhaustive_matcher --database_path "$work/brute_force.db" --FeatureMatching.use_gpu 0 \
+  --SiftMatching.cpu_brute_force_matcher 1 >"$work/brute_force.log" 2>&1 ||
+  { tail -n 5 "$work/brute_force.log"; fail "$colmap4 exhaustive_matcher"; }
+
+# COLMAP 4 leaves the matches of pairs with too few of them in the database.
+matches() { sqlite3 "$1" 'SELECT pair_id, rows, hex(data) FROM matches WHERE rows >= 15 ORDER BY 1'; }
+matches "$work/exact.db" >"$work/exact.txt"
+matches "$work/brute_force.db" >"$work/brute_force.txt"
+echo "$(wc -l <"$work/exact.txt") pairs with 15 matches or more, here;" \
+  "$(wc -l <"$work/brute_force.txt") by COLMAP's brute force;" \
+  "$(sqlite3 "$work/exact.db" 'SELECT sum(rows) FROM matches') matches"
+cmp "$work/exact.txt" "$work/brute_force.txt" || fail "the matches differ"
+echo "The same, row by row."

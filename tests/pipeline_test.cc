@@ -1,0 +1,76 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/pair_list.h"
+#include "tests/support/synthetic_database.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class PairListTest : public ::testing::Test {
+ protected:
+  PairList Read(const std::string& text) {
+    std::ofstream(path_) << text;
+    return ReadPairList(path_, images_);
+  }
+
+  TestDirectory directory_;
+  std::filesystem::path path_ = directory_.Path() / "pairs.txt";
+  std::vector<ImageRecord> images_ = {
+      {1, "a.jpg", 1}, {2, "b.jpg", 1}, {3, "my photo.jpg", 1}, {4, "photo.jpg", 1}, {5, "a.jpg my", 1}};
+};
+
+TEST_F(PairListTest, TwoNamesALine) {
+  const PairList list = Read("# a comment\na.jpg b.jpg\n\nphoto.jpg a.jpg\r\nb.jpg\ta.jpg \n");
+  EXPECT_THAT(list.pairs, ElementsAre(ImagePair(1, 2), ImagePair(1, 4), ImagePair(1, 2)));
+  EXPECT_EQ(list.num_skipped, 0U);
+}
+
+TEST_F(PairListTest, NamesWithSpaces) {
+  EXPECT_THAT(Read("my photo.jpg b.jpg\nb.jpg my photo.jpg\n").pairs,
+              ElementsAre(ImagePair(2, 3), ImagePair(2, 3)));
+}
+
+TEST_F(PairListTest, LinesThatCanBeReadInTwoWays) {
+  try {
+    Read("a.jpg b.jpg\na.jpg my photo.jpg\n");
+    FAIL();
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("Line 2"));
+    EXPECT_THAT(error.what(), HasSubstr("\"a.jpg my photo.jpg\""));
+  }
+  EXPECT_THAT(Read("a.jpg\tmy photo.jpg").pairs, ElementsAre(ImagePair(1, 3)));
+}
+
+TEST_F(PairListTest, LinesThatNameNoPairAreCounted) {
+  const PairList list = Read("a.jpg c.jpg\na.jpg\nb.jpg b.jpg\na.jpg b.jpg");
+  EXPECT_THAT(list.pairs, ElementsAre(ImagePair(1, 2)));
+  EXPECT_EQ(list.num_skipped, 3U);
+  EXPECT_EQ(list.first_skipped, "a.jpg c.jpg");
+  EXPECT_THAT(Read("").pairs, IsEmpty());
+}
+
+TEST_F(PairListTest, AFileThatIsNotThere) {
+  EXPECT_THROW(ReadPairList("/nowhere/pairs.txt", images_), FileError);
+}
+
+TEST(PipelineOptions, AListAndAnotherStrategyContradictEachOther) {
+  PipelineOptions options;
+  options.match_list_path = "pairs.txt";
+  options.Check();
+  options.strategy = PipelineOptions::Strategy::kExhaustive;
+  EXPECT_THROW(options.Check(), OptionsError);
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch
