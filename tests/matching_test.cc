@@ -1,10 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-// As in the code that is tested.
-#define HWY_WANT_AVX3_DL
-#include <hwy/targets.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -23,6 +19,7 @@
 #include "colmap_graphmatch/matching/descriptor_matcher.h"
 #include "colmap_graphmatch/matching/pair_order.h"
 #include "colmap_graphmatch/matching/top_two.h"
+#include "tests/support/matching_targets.h"
 #include "tests/support/reference_matching.h"
 
 namespace colmap_graphmatch {
@@ -38,19 +35,19 @@ using ::testing::ElementsAre;
 using ::testing::SizeIs;
 using ::testing::ValuesIn;
 
-// Every instruction set of this processor that the code was compiled for.
-class MatchingTest : public ::testing::TestWithParam<std::int64_t> {
+class MatchingTest : public ::testing::TestWithParam<MatchingTarget> {
  protected:
-  void SetUp() override { hwy::SetSupportedTargetsForTest(GetParam()); }
-  void TearDown() override { hwy::SetSupportedTargetsForTest(0); }
+  void SetUp() override { GetParam().Use(); }
+  void TearDown() override { MatchingTarget().Use(); }
 };
 
-std::string NameOfTarget(const ::testing::TestParamInfo<std::int64_t>& info) {
-  return hwy::TargetName(info.param);
+std::string NameOfTarget(const ::testing::TestParamInfo<MatchingTarget>& info) {
+  std::string name = info.param.Name();
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, MatchingTest, ValuesIn(hwy::SupportedAndGeneratedTargets()),
-                         NameOfTarget);
+INSTANTIATE_TEST_SUITE_P(Targets, MatchingTest, ValuesIn(MatchingTargets()), NameOfTarget);
 
 using Rows = std::vector<std::uint8_t>;
 

@@ -26,8 +26,11 @@ class PairListTest : public ::testing::Test {
 
   TestDirectory directory_;
   std::filesystem::path path_ = directory_.Path() / "pairs.txt";
-  std::vector<ImageRecord> images_ = {
-      {1, "a.jpg", 1}, {2, "b.jpg", 1}, {3, "my photo.jpg", 1}, {4, "photo.jpg", 1}, {5, "a.jpg my", 1}};
+  std::vector<ImageRecord> images_ = {{1, "a.jpg", 1},
+                                      {2, "b.jpg", 1},
+                                      {3, "my photo.jpg", 1},
+                                      {4, "photo.jpg", 1},
+                                      {5, "a.jpg my", 1}};
 };
 
 TEST_F(PairListTest, TwoNamesALine) {

@@ -53,42 +53,78 @@ HWY_INLINE Vector ToKey(Vector product, std::size_t vector) {
   return hn::Or(hn::ShiftLeft<kIndexBits>(product), IndexOfVector(vector));
 }
 
-// How an instruction set multiplies. A word of 32 bits contains kEntries entries of a descriptor.
-// PackA and PackB make words; Start gives the sum before the first word, for a vector of columns
-// whose entries sum up to column_sums; Key makes a key of the final sum.
+// How products are summed up. A word of 32 bits contains kEntries entries of a descriptor. PackA
+// and PackB make words; Start gives the sum before the first word, for a vector of columns whose
+// entries sum up to column_sums; Key makes a key of the final sum.
 //
 // Multiply-adds of integers are written in assembly because of what compilers make of the
 // intrinsics: GCC 12 moves the multiplications of a step before its additions, or copies the sums,
-// and has to spill them; twice as slow (docs/benchmarks.md).
-#if HWY_TARGET == HWY_AVX3_DL
-// Unsigned times signed bytes, four at a time: a is shifted by -128 to be signed, which the start
-// makes good.
-struct Arithmetic {
-  static constexpr std::size_t kEntries = 4;
-  static constexpr std::size_t kTileRows = 12;
+// and has to spill them; twice as slow (docs/benchmarks.md). It also reaches instructions that are
+// newer than the targets of Highway 1.0.
 
-  static std::uint32_t PackA(const std::uint8_t* entries) { return PackB(entries) ^ 0x80808080U; }
-  static std::uint32_t PackB(const std::uint8_t* entries) {
-    std::uint32_t word = 0;
-    std::memcpy(&word, entries, sizeof(word));
-    return word;
+// Tiles that fill 16 or 32 registers.
+constexpr std::size_t kTileRowsOf16 = 6;
+constexpr std::size_t kTileRowsOf32 = 12;
+
+std::uint32_t FourBytes(const std::uint8_t* entries) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, entries, sizeof(word));
+  return word;
+}
+
+#if HWY_TARGET == HWY_AVX3_DL || HWY_TARGET == HWY_AVX2
+// Unsigned times signed bytes, four at a time (VNNI): a is shifted by -128 to be signed, which the
+// start makes good.
+struct ByteArithmetic {
+  static constexpr std::size_t kEntries = 4;
+  static constexpr std::size_t kTileRows =
+      HWY_TARGET == HWY_AVX3_DL ? kTileRowsOf32 : kTileRowsOf16;
+
+  static std::uint32_t PackA(const std::uint8_t* entries) {
+    return FourBytes(entries) ^ 0x80808080U;
   }
+  static std::uint32_t PackB(const std::uint8_t* entries) { return FourBytes(entries); }
   static HWY_INLINE Vector Start(Vector column_sums, std::size_t /*vector*/) {
     return hn::ShiftLeft<7>(column_sums);
   }
   static HWY_INLINE Vector MulAdd(Vector a, Vector b, Vector sum) {
+#if HWY_TARGET == HWY_AVX3_DL
     asm("vpdpbusd %[a],%[b],%[sum]" : [sum] "+v"(sum.raw) : [a] "v"(a.raw), [b] "v"(b.raw));
+#else
+    asm("%{vex%} vpdpbusd %[a],%[b],%[sum]" : [sum] "+x"(sum.raw) : [a] "x"(a.raw), [b] "x"(b.raw));
+#endif
     return sum;
   }
   static HWY_INLINE Vector Key(Vector sum, std::size_t vector) { return ToKey(sum, vector); }
 };
-#elif HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || \
+#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
+// Unsigned bytes, four at a time (Armv8.2's dot product).
+struct ByteArithmetic {
+  static constexpr std::size_t kEntries = 4;
+  static constexpr std::size_t kTileRows = kTileRowsOf32;
+
+  static std::uint32_t PackA(const std::uint8_t* entries) { return FourBytes(entries); }
+  static std::uint32_t PackB(const std::uint8_t* entries) { return FourBytes(entries); }
+  static HWY_INLINE Vector Start(Vector /*column_sums*/, std::size_t /*vector*/) {
+    return hn::Zero(Tag());
+  }
+  static HWY_INLINE Vector MulAdd(Vector a, Vector b, Vector sum) {
+    asm(".arch armv8.2-a+dotprod+crypto\n\tudot %[sum].4s,%[a].16b,%[b].16b"
+        : [sum] "+w"(sum.raw)
+        : [a] "w"(a.raw), [b] "w"(b.raw));
+    return sum;
+  }
+  static HWY_INLINE Vector Key(Vector sum, std::size_t vector) { return ToKey(sum, vector); }
+};
+#endif
+
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || \
     HWY_TARGET == HWY_SSSE3
 // Pairs of int16. There is room to have a scaled by 128, and the sum start from the index: the sums
 // are the keys.
-struct Arithmetic {
+struct Int16Arithmetic {
   static constexpr std::size_t kEntries = 2;
-  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_AVX3 ? 12 : 6;
+  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_AVX3 ? kTileRowsOf32 : kTileRowsOf16;
 
   static std::uint32_t PackA(const std::uint8_t* entries) { return PackB(entries) << kIndexBits; }
   static std::uint32_t PackB(const std::uint8_t* entries) {
@@ -115,11 +151,11 @@ struct Arithmetic {
   }
   static HWY_INLINE Vector Key(Vector sum, std::size_t /*vector*/) { return sum; }
 };
-#else
+#elif HWY_TARGET != HWY_AVX3_DL
 // Single precision, which is exact: every sum stays below 2^24.
-struct Arithmetic {
+struct FloatArithmetic {
   static constexpr std::size_t kEntries = 1;
-  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_NEON ? 12 : 4;
+  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_NEON ? kTileRowsOf32 : 4;
 
   static std::uint32_t PackA(const std::uint8_t* entries) { return PackB(entries); }
   static std::uint32_t PackB(const std::uint8_t* entries) {
@@ -142,66 +178,62 @@ struct Arithmetic {
 };
 #endif
 
-constexpr std::size_t kTileRows = Arithmetic::kTileRows;
+// Words of a descriptor.
+template <class Arithmetic>
 constexpr std::size_t kWords = kDim / Arithmetic::kEntries;
 
 // A panel: the packed columns of one tile, after the sums of their entries.
 HWY_INLINE std::size_t PanelColumns() { return kTileVectors * hn::Lanes(Tag()); }
-HWY_INLINE std::size_t PanelWords() { return (1 + kWords) * PanelColumns(); }
+template <class Arithmetic>
+HWY_INLINE std::size_t PanelWords() {
+  return (1 + kWords<Arithmetic>)*PanelColumns();
+}
 
 // Columns first .. first + num - 1 of b as panels. Columns that fill up the last one are zeros.
+template <class Arithmetic>
 void PackColumns(const DescriptorView& b, std::size_t first, std::size_t num,
                  std::uint32_t* packed) {
   const std::size_t width = PanelColumns();
-  for (std::size_t column = 0; column < num; column += width, packed += PanelWords()) {
+  for (std::size_t column = 0; column < num; column += width, packed += PanelWords<Arithmetic>()) {
     const std::size_t num_here = std::min(width, num - column);
-    if (num_here < width) std::fill_n(packed, PanelWords(), 0);
+    if (num_here < width) std::fill_n(packed, PanelWords<Arithmetic>(), 0);
     for (std::size_t i = 0; i < num_here; ++i) {
       const std::uint8_t* entries = b.data + (first + column + i) * kDim;
       std::uint32_t sum = 0;
       for (std::size_t d = 0; d < kDim; ++d) sum += entries[d];
       packed[i] = sum;
-      for (std::size_t k = 0; k < kWords; ++k) {
+      for (std::size_t k = 0; k < kWords<Arithmetic>; ++k) {
         packed[(1 + k) * width + i] = Arithmetic::PackB(entries + k * Arithmetic::kEntries);
       }
     }
   }
 }
 
-// Rows first .. first + kTileRows - 1 of a; those beyond the end are zeros.
+// Rows first .. first + Arithmetic::kTileRows - 1 of a; those beyond the end are zeros.
+template <class Arithmetic>
 void PackRows(const DescriptorView& a, std::size_t first, std::uint32_t* packed) {
   static constexpr std::array<std::uint8_t, kDim> kZeros = {};
-  for (std::size_t row = 0; row < kTileRows; ++row, packed += kWords) {
+  for (std::size_t row = 0; row < Arithmetic::kTileRows; ++row, packed += kWords<Arithmetic>) {
     const std::uint8_t* entries =
         first + row < a.num ? a.data + (first + row) * kDim : kZeros.data();
-    for (std::size_t k = 0; k < kWords; ++k) {
+    for (std::size_t k = 0; k < kWords<Arithmetic>; ++k) {
       packed[k] = Arithmetic::PackA(entries + k * Arithmetic::kEntries);
     }
   }
 }
 
-// The greatest two keys of every lane.
-struct BestTwo {
-  Vector best;
-  Vector second;
-
-  static HWY_INLINE BestTwo Load(const std::int32_t* best, const std::int32_t* second) {
-    return {hn::Load(Tag(), best), hn::Load(Tag(), second)};
-  }
-  HWY_INLINE void Enter(Vector key) {
-    second = hn::Max(second, hn::Min(best, key));
-    best = hn::Max(best, key);
-  }
-  HWY_INLINE void Store(std::int32_t* to_best, std::int32_t* to_second) const {
-    hn::Store(best, Tag(), to_best);
-    hn::Store(second, Tag(), to_second);
-  }
-};
+// Enters a key into the greatest two of every lane.
+HWY_INLINE void Enter(Vector key, Vector& best, Vector& second) {
+  second = hn::Max(second, hn::Min(best, key));
+  best = hn::Max(best, key);
+}
 
 // The products of a tile of rows with one panel, whose first vector is first_vector of the block,
-// entered into the best two of every lane of the rows (kTileRows x lanes) and of the columns.
+// entered into the best two of every lane of the rows (Arithmetic::kTileRows x lanes) and of the
+// columns.
 //
 // Its loops are unrolled by order: only with constant indices are the sums kept in registers.
+template <class Arithmetic>
 HWY_INLINE void Tile(const std::uint32_t* HWY_RESTRICT a, const std::uint32_t* HWY_RESTRICT panel,
                      std::size_t first_vector, std::int32_t* HWY_RESTRICT row_best,
                      std::int32_t* HWY_RESTRICT row_second, std::int32_t* HWY_RESTRICT column_best,
@@ -212,45 +244,50 @@ HWY_INLINE void Tile(const std::uint32_t* HWY_RESTRICT a, const std::uint32_t* H
   const auto load = [&](std::size_t row, std::size_t v) {
     return hn::BitCast(tag, hn::Load(words, panel + (row * kTileVectors + v) * lanes));
   };
-  Vector sums[kTileRows][kTileVectors];
+  Vector sums[Arithmetic::kTileRows][kTileVectors];
 #pragma GCC unroll 16
   for (std::size_t v = 0; v < kTileVectors; ++v) {
     const Vector start = Arithmetic::Start(load(0, v), first_vector + v);
 #pragma GCC unroll 16
-    for (std::size_t i = 0; i < kTileRows; ++i) sums[i][v] = start;
+    for (std::size_t i = 0; i < Arithmetic::kTileRows; ++i) sums[i][v] = start;
   }
-  for (std::size_t k = 0; k < kWords; ++k) {
+  for (std::size_t k = 0; k < kWords<Arithmetic>; ++k) {
     Vector b[kTileVectors];
 #pragma GCC unroll 16
     for (std::size_t v = 0; v < kTileVectors; ++v) b[v] = load(1 + k, v);
 #pragma GCC unroll 16
-    for (std::size_t i = 0; i < kTileRows; ++i) {
-      const Vector word = hn::BitCast(tag, hn::Set(words, a[i * kWords + k]));
+    for (std::size_t i = 0; i < Arithmetic::kTileRows; ++i) {
+      const Vector word = hn::BitCast(tag, hn::Set(words, a[i * kWords<Arithmetic> + k]));
 #pragma GCC unroll 16
       for (std::size_t v = 0; v < kTileVectors; ++v) {
         sums[i][v] = Arithmetic::MulAdd(word, b[v], sums[i][v]);
       }
     }
   }
-  BestTwo columns[kTileVectors];
+  Vector column_bests[kTileVectors];
+  Vector column_seconds[kTileVectors];
 #pragma GCC unroll 16
   for (std::size_t v = 0; v < kTileVectors; ++v) {
-    columns[v] = BestTwo::Load(column_best + v * lanes, column_second + v * lanes);
+    column_bests[v] = hn::Load(tag, column_best + v * lanes);
+    column_seconds[v] = hn::Load(tag, column_second + v * lanes);
   }
 #pragma GCC unroll 16
-  for (std::size_t i = 0; i < kTileRows; ++i) {
-    BestTwo row = BestTwo::Load(row_best + i * lanes, row_second + i * lanes);
+  for (std::size_t i = 0; i < Arithmetic::kTileRows; ++i) {
+    Vector best = hn::Load(tag, row_best + i * lanes);
+    Vector second = hn::Load(tag, row_second + i * lanes);
 #pragma GCC unroll 16
     for (std::size_t v = 0; v < kTileVectors; ++v) {
       const Vector key = Arithmetic::Key(sums[i][v], first_vector + v);
-      row.Enter(key);
-      columns[v].Enter(key);
+      Enter(key, best, second);
+      Enter(key, column_bests[v], column_seconds[v]);
     }
-    row.Store(row_best + i * lanes, row_second + i * lanes);
+    hn::Store(best, tag, row_best + i * lanes);
+    hn::Store(second, tag, row_second + i * lanes);
   }
 #pragma GCC unroll 16
   for (std::size_t v = 0; v < kTileVectors; ++v) {
-    columns[v].Store(column_best + v * lanes, column_second + v * lanes);
+    hn::Store(column_bests[v], tag, column_best + v * lanes);
+    hn::Store(column_seconds[v], tag, column_second + v * lanes);
   }
 }
 
@@ -290,13 +327,15 @@ T* Aligned(std::vector<T>* values, std::size_t num) {
   return values->data() + (kAlignment - address % kAlignment) % kAlignment / sizeof(T);
 }
 
-void ComputeTopTwoOnTarget(const DescriptorView& a, const DescriptorView& b, TopTwoBuffers* buffers,
-                           TopTwo* result) {
+template <class Arithmetic>
+void ComputeWith(const DescriptorView& a, const DescriptorView& b, TopTwoBuffers* buffers,
+                 TopTwo* result) {
+  constexpr std::size_t kTileRows = Arithmetic::kTileRows;
   const std::size_t lanes = hn::Lanes(Tag());
   const std::size_t block_columns = kBlockVectors * lanes;
   std::uint32_t* packed_b =
-      Aligned(&buffers->packed_b, kBlockVectors / kTileVectors * PanelWords());
-  std::uint32_t* packed_a = Aligned(&buffers->packed_a, kTileRows * kWords);
+      Aligned(&buffers->packed_b, kBlockVectors / kTileVectors * PanelWords<Arithmetic>());
+  std::uint32_t* packed_a = Aligned(&buffers->packed_a, kTileRows * kWords<Arithmetic>);
   std::int32_t* row_best = Aligned(&buffers->row_keys, 2 * kTileRows * lanes);
   std::int32_t* row_second = row_best + kTileRows * lanes;
   std::int32_t* column_best = Aligned(&buffers->column_keys, 2 * block_columns);
@@ -304,16 +343,16 @@ void ComputeTopTwoOnTarget(const DescriptorView& a, const DescriptorView& b, Top
 
   for (std::size_t first = 0; first < b.num; first += block_columns) {
     const std::size_t num = std::min(block_columns, b.num - first);
-    PackColumns(b, first, num, packed_b);
+    PackColumns<Arithmetic>(b, first, num, packed_b);
     std::fill_n(column_best, 2 * block_columns, 0);
     for (std::size_t row = 0; row < a.num; row += kTileRows) {
-      PackRows(a, row, packed_a);
+      PackRows<Arithmetic>(a, row, packed_a);
       std::fill_n(row_best, 2 * kTileRows * lanes, 0);
       const std::uint32_t* panel = packed_b;
       for (std::size_t column = 0; column < num; column += PanelColumns()) {
-        Tile(packed_a, panel, column / lanes, row_best, row_second, column_best + column,
-             column_second + column);
-        panel += PanelWords();
+        Tile<Arithmetic>(packed_a, panel, column / lanes, row_best, row_second,
+                         column_best + column, column_second + column);
+        panel += PanelWords<Arithmetic>();
       }
       for (std::size_t i = 0; i < std::min(kTileRows, a.num - row); ++i) {
         FinishRow(row_best + i * lanes, row_second + i * lanes, first, row + i, result);
@@ -326,14 +365,77 @@ void ComputeTopTwoOnTarget(const DescriptorView& a, const DescriptorView& b, Top
   }
 }
 
-const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
+void ComputeTopTwoOnTarget(const DescriptorView& a, const DescriptorView& b, bool dot_products,
+                           TopTwoBuffers* buffers, TopTwo* result) {
+#if HWY_TARGET == HWY_AVX3_DL
+  static_cast<void>(dot_products);  // Part of the target.
+  ComputeWith<ByteArithmetic>(a, b, buffers, result);
+#elif HWY_TARGET == HWY_AVX2
+  if (dot_products) return ComputeWith<ByteArithmetic>(a, b, buffers, result);
+  ComputeWith<Int16Arithmetic>(a, b, buffers, result);
+#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
+  if (dot_products) return ComputeWith<ByteArithmetic>(a, b, buffers, result);
+  ComputeWith<FloatArithmetic>(a, b, buffers, result);
+#elif HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3
+  static_cast<void>(dot_products);  // There are none.
+  ComputeWith<Int16Arithmetic>(a, b, buffers, result);
+#else
+  static_cast<void>(dot_products);
+  ComputeWith<FloatArithmetic>(a, b, buffers, result);
+#endif
+}
+
+// The target, and whether it is one that dot products of bytes add to.
+const char* TargetName(bool dot_products) {
+#if HWY_TARGET == HWY_AVX2
+  if (dot_products) return "AVX2 with VNNI";
+#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
+  if (dot_products) return "NEON with dot products";
+#endif
+  static_cast<void>(dot_products);
+  return hwy::TargetName(HWY_TARGET);
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace colmap_graphmatch
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+
+#if HWY_ARCH_ARM_A64
+#include <sys/auxv.h>
+#elif HWY_ARCH_X86
+#include <cpuid.h>
+#endif
+
 namespace colmap_graphmatch {
+namespace {
+
+// Instructions that Highway 1.0 does not ask the processor about: AVX-VNNI, or Armv8.2's udot.
+bool DetectDotProducts() {
+#if HWY_ARCH_X86
+  constexpr unsigned kAvxVnni = 1U << 4;
+  unsigned eax = 0;
+  unsigned ebx = 0;
+  unsigned ecx = 0;
+  unsigned edx = 0;
+  return __get_cpuid_count(7, 1, &eax, &ebx, &ecx, &edx) != 0 && (eax & kAvxVnni) != 0;
+#elif HWY_ARCH_ARM_A64
+  constexpr unsigned long kAsimdDp = 1UL << 20;
+  return (::getauxval(AT_HWCAP) & kAsimdDp) != 0;
+#else
+  return false;
+#endif
+}
+
+bool dot_products_allowed = true;
+
+bool UseDotProducts() {
+  static const bool detected = DetectDotProducts();
+  return detected && dot_products_allowed;
+}
+
+}  // namespace
 
 HWY_EXPORT(ComputeTopTwoOnTarget);
 HWY_EXPORT(TargetName);
@@ -345,10 +447,12 @@ void ComputeTopTwo(const DescriptorView& a, const DescriptorView& b, TopTwoBuffe
   result->best_b.assign(a.num, 0);
   result->best_of_b.assign(b.num, 0);
   result->second_of_b.assign(b.num, 0);
-  HWY_DYNAMIC_DISPATCH(ComputeTopTwoOnTarget)(a, b, buffers, result);
+  HWY_DYNAMIC_DISPATCH(ComputeTopTwoOnTarget)(a, b, UseDotProducts(), buffers, result);
 }
 
-const char* TopTwoTarget() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
+const char* TopTwoTarget() { return HWY_DYNAMIC_DISPATCH(TargetName)(UseDotProducts()); }
+
+void AllowDotProductsForTest(bool allowed) { dot_products_allowed = allowed; }
 
 }  // namespace colmap_graphmatch
 #endif

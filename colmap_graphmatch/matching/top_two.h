@@ -39,7 +39,12 @@ struct TopTwoBuffers {
 void ComputeTopTwo(const DescriptorView& a, const DescriptorView& b, TopTwoBuffers* buffers,
                    TopTwo* result);
 
-// The instruction set that ComputeTopTwo uses on this machine, by Highway's name.
+// The instruction set that ComputeTopTwo uses on this machine.
 const char* TopTwoTarget();
+
+// Beside Highway's targets, AVX2 and NEON have instructions for dot products of bytes on newer
+// processors, which are used where they exist. For tests and benchmarks of the code without them;
+// not thread-safe.
+void AllowDotProductsForTest(bool allowed);
 
 }  // namespace colmap_graphmatch

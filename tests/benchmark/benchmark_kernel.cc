@@ -5,10 +5,6 @@
 
 #include <fmt/format.h>
 
-// As in the code that is measured.
-#define HWY_WANT_AVX3_DL
-#include <hwy/targets.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -20,6 +16,7 @@
 #include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/matching/top_two.h"
+#include "tests/support/matching_targets.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -28,7 +25,7 @@ namespace {
 // the multiplications a step.
 struct Peak {
   const char* name;
-  std::int64_t target;  // Of the kernels that are compared with it.
+  const char* target;  // The name of the kernel that is compared with it.
   std::function<double(std::int64_t num)> run;
 };
 
@@ -48,6 +45,7 @@ struct Peak {
 #define GRAPHMATCH_WIDE_MADD(k)            \
   "vpmaddwd %%zmm12, %%zmm13, %%zmm15\n\t" \
   "vpaddd %%zmm15, %%zmm" #k ", %%zmm" #k "\n\t"
+#define GRAPHMATCH_VEX_DOT(k) "%{vex%} vpdpbusd %%ymm12, %%ymm13, %%ymm" #k "\n\t"
 #define GRAPHMATCH_DOT(k) "vpdpbusd %%zmm12, %%zmm13, %%zmm" #k "\n\t"
 
 // Registers are zeroed: what they happen to contain could be slow to add up.
@@ -64,16 +62,21 @@ double WideInt16Peak(std::int64_t num) {
   GRAPHMATCH_LOOP(GRAPHMATCH_WIDE_MADD);
   return 12 * 32;
 }
+double VexInt8Peak(std::int64_t num) {
+  GRAPHMATCH_LOOP(GRAPHMATCH_VEX_DOT);
+  return 12 * 32;
+}
 double Int8Peak(std::int64_t num) {
   GRAPHMATCH_LOOP(GRAPHMATCH_DOT);
   return 12 * 64;
 }
 
 std::vector<Peak> Peaks() {
-  return {{"float FMA, 256 bits", HWY_AVX2, FloatPeak},
-          {"int16 multiply-add and add, 256 bits", HWY_AVX2, Int16Peak},
-          {"int16 multiply-add and add, 512 bits", HWY_AVX3, WideInt16Peak},
-          {"int8 dot product (VNNI), 512 bits", HWY_AVX3_DL, Int8Peak}};
+  return {{"float FMA, 256 bits", "AVX2", FloatPeak},
+          {"int16 multiply-add and add, 256 bits", "AVX2", Int16Peak},
+          {"int16 multiply-add and add, 512 bits", "AVX3", WideInt16Peak},
+          {"int8 dot product (VNNI), 256 bits", "AVX2 with VNNI", VexInt8Peak},
+          {"int8 dot product (VNNI), 512 bits", "AVX3_DL", Int8Peak}};
 }
 #else
 std::vector<Peak> Peaks() { return {}; }
@@ -86,9 +89,11 @@ double Median(std::vector<double> values) {
 
 void Main(std::size_t num_features, int num_runs) {
   std::vector<Peak> peaks;
-  const std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
+  const std::vector<MatchingTarget> targets = MatchingTargets();
   for (const Peak& peak : Peaks()) {
-    if (std::find(targets.begin(), targets.end(), peak.target) != targets.end()) {
+    // An instruction that this processor does not have must not be tried.
+    if (std::any_of(targets.begin(), targets.end(),
+                    [&](const MatchingTarget& target) { return target.Name() == peak.target; })) {
       peaks.push_back(peak);
     }
   }
@@ -110,7 +115,7 @@ void Main(std::size_t num_features, int num_runs) {
       if (run > 0) peak_rates[i].push_back(rate);
     }
     for (std::size_t i = 0; i < targets.size(); ++i) {
-      hwy::SetSupportedTargetsForTest(targets[i]);
+      targets[i].Use();
       const Stopwatch stopwatch;
       ComputeTopTwo({a.data(), num_features}, {b.data(), num_features}, &buffers, &result);
       const auto products = static_cast<double>(num_features * num_features);
@@ -118,7 +123,7 @@ void Main(std::size_t num_features, int num_runs) {
       if (run > 0) kernel_rates[i].push_back(products * kDescriptorDim / stopwatch.Seconds());
     }
   }
-  hwy::SetSupportedTargetsForTest(0);
+  MatchingTarget().Use();
 
   fmt::print("peak                                     G multiply-adds/s\n");
   for (std::size_t i = 0; i < peaks.size(); ++i) {
@@ -130,10 +135,10 @@ void Main(std::size_t num_features, int num_runs) {
     const double rate = Median(kernel_rates[i]);
     double peak = 0;
     for (std::size_t p = 0; p < peaks.size(); ++p) {
-      if (peaks[p].target == targets[i]) peak = std::max(peak, Median(peak_rates[p]));
+      if (peaks[p].target == targets[i].Name()) peak = std::max(peak, Median(peak_rates[p]));
     }
     const auto products = static_cast<double>(num_features * num_features);
-    fmt::print("{:<26} {:>17.1f} {:>9.4f} {:>13}\n", hwy::TargetName(targets[i]), rate / 1e9,
+    fmt::print("{:<26} {:>17.1f} {:>9.4f} {:>13}\n", targets[i].Name(), rate / 1e9,
                products * kDescriptorDim / rate,
                peak > 0 ? fmt::format("{:.1f} %", 100 * rate / peak) : "-");
   }

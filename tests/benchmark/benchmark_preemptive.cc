@@ -36,8 +36,8 @@ struct PairResult {
   bool is_edge = false;
   std::size_t num_inliers = 0;
   bool reaches_colmap = false;
-  double seconds = 0;                         // Of matching all features.
-  std::vector<std::size_t> num_matches;       // By index in kNumFeatures.
+  double seconds = 0;                    // Of matching all features.
+  std::vector<std::size_t> num_matches;  // By index in kNumFeatures.
   std::vector<double> preemptive_seconds;
 };
 
@@ -85,8 +85,9 @@ void Main(const char* path) {
   }
   fmt::print("{} pairs, {} reach COLMAP, {} edges; matching all features {:.1f} s ({})\n\n",
              results.size(), num_to_colmap, num_edges, seconds, TopTwoTarget());
-  fmt::print("features  matches   given up   matching time   fewer for COLMAP   edges lost   their "
-             "inliers: median, most\n");
+  fmt::print(
+      "features  matches   given up   matching time   fewer for COLMAP   edges lost   their "
+      "inliers: median, most\n");
   for (std::size_t i = 0; i < kNumFeatures.size(); ++i) {
     for (const std::size_t min_matches : kMinMatches) {
       std::size_t num_given_up = 0;
@@ -105,12 +106,14 @@ void Main(const char* path) {
       }
       std::sort(lost.begin(), lost.end());
       const auto percent = [](std::size_t part, std::size_t whole) {
-        return 100 * static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(whole, 1));
+        return 100 * static_cast<double>(part) /
+               static_cast<double>(std::max<std::size_t>(whole, 1));
       };
       fmt::print("{:>8} {:>8} {:>8.1f} % {:>15.3f} {:>16.1f} % {:>10.2f} % {:>12}, {}\n",
                  kNumFeatures[i], min_matches, percent(num_given_up, results.size()),
-                 time / seconds, percent(num_spared, num_to_colmap), percent(lost.size(), num_edges),
-                 lost.empty() ? 0 : lost[lost.size() / 2], lost.empty() ? 0 : lost.back());
+                 time / seconds, percent(num_spared, num_to_colmap),
+                 percent(lost.size(), num_edges), lost.empty() ? 0 : lost[lost.size() / 2],
+                 lost.empty() ? 0 : lost.back());
     }
   }
 }

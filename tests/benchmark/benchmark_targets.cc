@@ -3,10 +3,6 @@
 
 #include <fmt/format.h>
 
-// As in the code that is measured.
-#define HWY_WANT_AVX3_DL
-#include <hwy/targets.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <map>
@@ -16,6 +12,7 @@
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/matching/descriptor_matcher.h"
 #include "colmap_graphmatch/pipeline/pair_list.h"
+#include "tests/support/matching_targets.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -31,13 +28,13 @@ void Main(const char* path, const char* list_path, int num_runs) {
   };
   for (const ImagePair& pair : pairs) products += read(pair.id1) * read(pair.id2);
 
-  const std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
+  const std::vector<MatchingTarget> targets = MatchingTargets();
   std::vector<std::vector<double>> seconds(targets.size());
   DescriptorMatcher matcher{DescriptorMatchingOptions()};
   for (int run = 0; run < num_runs; ++run) {
     for (std::size_t i = 0; i < targets.size(); ++i) {
-      if (targets[i] == HWY_SCALAR || targets[i] == HWY_EMU128) continue;
-      hwy::SetSupportedTargetsForTest(targets[i]);
+      if (targets[i].target == HWY_SCALAR || targets[i].target == HWY_EMU128) continue;
+      targets[i].Use();
       const double start = ThreadCpuSeconds();
       for (const ImagePair& pair : pairs) {
         const Descriptors& a = images.at(pair.id1);
@@ -47,13 +44,13 @@ void Main(const char* path, const char* list_path, int num_runs) {
       seconds[i].push_back(ThreadCpuSeconds() - start);
     }
   }
-  hwy::SetSupportedTargetsForTest(0);
+  MatchingTarget().Use();
   fmt::print("{} pairs of {:.1f} M products each\n", pairs.size(),
              products / 1e6 / static_cast<double>(std::max<std::size_t>(1, pairs.size())));
   for (std::size_t i = 0; i < targets.size(); ++i) {
     if (seconds[i].empty()) continue;
     std::sort(seconds[i].begin(), seconds[i].end());
-    fmt::print("{:<8} {:.3f} s\n", hwy::TargetName(targets[i]), seconds[i][seconds[i].size() / 2]);
+    fmt::print("{:<22} {:.3f} s\n", targets[i].Name(), seconds[i][seconds[i].size() / 2]);
   }
 }
 
