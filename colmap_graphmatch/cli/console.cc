@@ -39,7 +39,7 @@ std::string FormatVerification(const VerifierStatistics& statistics) {
   if (statistics.num_matched == 0 || both <= 0) return "";
   const auto num_matched = static_cast<double>(statistics.num_matched);
   std::string text =
-      fmt::format("Exact matching     {} pairs in {} of CPU time, {:.2f} image reads a pair\n",
+      fmt::format("Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
                   statistics.num_matched, FormatDuration(statistics.matching_seconds),
                   static_cast<double>(statistics.num_image_reads) / num_matched);
   if (statistics.num_preempted > 0) {

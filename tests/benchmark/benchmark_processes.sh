@@ -15,7 +15,7 @@ measure() { # NUM_PROCESSES: seconds
   local start end
   start=$(date +%s.%N)
   "$matcher" --database_path "$work/copy.db" --SiftMatching.use_gpu 0 \
-    --GraphMatching.num_processes "$1" >"$work/log.txt" 2>&1
+    --GraphMatching.matcher colmap --GraphMatching.num_processes "$1" >"$work/log.txt" 2>&1
   end=$(date +%s.%N)
   awk -v a="$start" -v b="$end" 'BEGIN { printf "%.2f", b - a }'
 }
