@@ -61,10 +61,8 @@ HWY_INLINE Vector ToKey(Vector product, std::size_t vector) {
 // intrinsics: GCC 12 moves the multiplications of a step before its additions, or copies the sums,
 // and has to spill them; twice as slow (docs/benchmarks.md). It also reaches instructions that are
 // newer than the targets of Highway 1.0.
-
-// Tiles that fill 16 or 32 registers.
-constexpr std::size_t kTileRowsOf16 = 6;
-constexpr std::size_t kTileRowsOf32 = 12;
+//
+// Tiles have 6 rows where there are 16 registers for vectors, and 12 where there are 32.
 
 std::uint32_t FourBytes(const std::uint8_t* entries) {
   std::uint32_t word = 0;
@@ -77,8 +75,7 @@ std::uint32_t FourBytes(const std::uint8_t* entries) {
 // start makes good.
 struct ByteArithmetic {
   static constexpr std::size_t kEntries = 4;
-  static constexpr std::size_t kTileRows =
-      HWY_TARGET == HWY_AVX3_DL ? kTileRowsOf32 : kTileRowsOf16;
+  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_AVX3_DL ? 12 : 6;
 
   static std::uint32_t PackA(const std::uint8_t* entries) {
     return FourBytes(entries) ^ 0x80808080U;
@@ -101,7 +98,7 @@ struct ByteArithmetic {
 // Unsigned bytes, four at a time (Armv8.2's dot product).
 struct ByteArithmetic {
   static constexpr std::size_t kEntries = 4;
-  static constexpr std::size_t kTileRows = kTileRowsOf32;
+  static constexpr std::size_t kTileRows = 12;
 
   static std::uint32_t PackA(const std::uint8_t* entries) { return FourBytes(entries); }
   static std::uint32_t PackB(const std::uint8_t* entries) { return FourBytes(entries); }
@@ -124,7 +121,7 @@ struct ByteArithmetic {
 // are the keys.
 struct Int16Arithmetic {
   static constexpr std::size_t kEntries = 2;
-  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_AVX3 ? kTileRowsOf32 : kTileRowsOf16;
+  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_AVX3 ? 12 : 6;
 
   static std::uint32_t PackA(const std::uint8_t* entries) { return PackB(entries) << kIndexBits; }
   static std::uint32_t PackB(const std::uint8_t* entries) {
@@ -155,7 +152,7 @@ struct Int16Arithmetic {
 // Single precision, which is exact: every sum stays below 2^24.
 struct FloatArithmetic {
   static constexpr std::size_t kEntries = 1;
-  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_NEON ? kTileRowsOf32 : 4;
+  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_NEON ? 12 : 4;
 
   static std::uint32_t PackA(const std::uint8_t* entries) { return PackB(entries); }
   static std::uint32_t PackB(const std::uint8_t* entries) {
