@@ -1,11 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 #include <ostream>
 #include <stdexcept>
 #include <string>
@@ -233,6 +237,32 @@ TEST_P(MatchingTest, MatchesNearTheThresholds) {
   EXPECT_LT(num_matches, 600U);
 }
 
+TEST_P(MatchingTest, ThresholdsThatAreMetExactly) {
+  // Angles as the matcher computes them: whether one that is met exactly passes, decides one bit.
+  const auto angle = [](std::int32_t product) {
+    return std::acos(std::min(1.0F / (512.0F * 512.0F) * static_cast<float>(product), 1.0F));
+  };
+  const Rows a = SiftRows(60, 21);
+  const Rows b = NoisyCopies(a, 22);
+  for (std::size_t i = 0; i < View(a).num; ++i) {
+    const ReferenceBest found = ReferenceBestOf(View(a), i, View(b));
+    if (angle(found.best) == 0) continue;
+    DescriptorMatchingOptions options;
+    options.cross_check = false;
+    options.max_distance = 4;
+    options.max_ratio = angle(found.best) / angle(found.second);
+    EXPECT_EQ(DescriptorMatcher(options).Match(View(a), View(b)),
+              ReferenceMatch(options, View(a), View(b)));
+    options.max_ratio = 2;
+    options.max_distance = angle(found.best);
+    const auto matches = DescriptorMatcher(options).Match(View(a), View(b));
+    EXPECT_EQ(matches, ReferenceMatch(options, View(a), View(b)));
+    EXPECT_EQ(std::count_if(matches.begin(), matches.end(),
+                            [&](const FeatureMatch& match) { return match.feature1 == i; }),
+              1);
+  }
+}
+
 TEST(DescriptorMatcher, Options) {
   const auto check = [](double ratio, double distance, int num) {
     DescriptorMatchingOptions options;
@@ -339,6 +369,34 @@ TEST(DescriptorCache, CanBeClosedWhileImagesAreOnTheirWay) {
 
 TEST(DescriptorCache, TheDefaultIsAShareOfTheMemory) {
   EXPECT_GT(DefaultCacheBytes(), std::size_t{10} << 20);
+}
+
+TEST(DescriptorCache, MemoryLimitsOfControlGroups) {
+  const std::filesystem::path root =
+      std::filesystem::path(::testing::TempDir()) / ("cgroup" + std::to_string(::getpid()));
+  const auto write = [&](const std::string& path, const std::string& text) {
+    std::filesystem::create_directories((root / path).parent_path());
+    std::ofstream(root / path) << text << "\n";
+  };
+  const auto limit = [&](const std::string& groups) {
+    write("groups", groups);
+    return MemoryLimit(root / "groups", root);
+  };
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  EXPECT_EQ(MemoryLimit(root / "none", root), kNone);
+  write("job/step/memory.max", "max");
+  EXPECT_EQ(limit("0::/job/step"), kNone);
+  write("job/memory.max", "5000");
+  EXPECT_EQ(limit("0::/job/step"), 5000U);
+  EXPECT_EQ(limit("0::/"), kNone);
+  write("job/step/memory.max", "4000");
+  EXPECT_EQ(limit("1:name=systemd:/x\n0::/job/step"), 4000U);
+  write("memory/batch/memory.limit_in_bytes", "3000");
+  EXPECT_EQ(limit("9:memory:/batch"), 3000U);
+  EXPECT_EQ(limit("9:cpu:/batch"), kNone);
+  write("memory.max", "2000");
+  EXPECT_EQ(limit("0::/job/step"), 2000U);
+  std::filesystem::remove_all(root);
 }
 
 // Image reads of a cache with room for so many images, if the pairs come in this order.

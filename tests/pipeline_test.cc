@@ -39,6 +39,11 @@ TEST_F(PairListTest, TwoNamesALine) {
   EXPECT_EQ(list.num_skipped, 0U);
 }
 
+TEST_F(PairListTest, WhatStandsBeforeAndAfter) {
+  EXPECT_THAT(Read("  a.jpg b.jpg\n  # a comment\na.jpg b.jpg 0.83 x\na.jpg\tb.jpg\t0.5\n").pairs,
+              ElementsAre(ImagePair(1, 2), ImagePair(1, 2), ImagePair(1, 2)));
+}
+
 TEST_F(PairListTest, NamesWithSpaces) {
   EXPECT_THAT(Read("my photo.jpg b.jpg\nb.jpg my photo.jpg\n").pairs,
               ElementsAre(ImagePair(2, 3), ImagePair(2, 3)));
@@ -61,6 +66,9 @@ TEST_F(PairListTest, LinesThatNameNoPairAreCounted) {
   EXPECT_EQ(list.num_skipped, 3U);
   EXPECT_EQ(list.first_skipped, "a.jpg c.jpg");
   EXPECT_THAT(Read("").pairs, IsEmpty());
+  EXPECT_THROW(Read("a.jpg c.jpg"), FileError);
+  images_[1].num_features = 0;
+  EXPECT_THROW(Read("a.jpg b.jpg"), FileError);
 }
 
 TEST_F(PairListTest, AFileThatIsNotThere) {

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -254,7 +255,8 @@ TEST_F(VerifierTest, OptionsAreSpeltAsTheInstalledColmapSpellsThem) {
   Set("FAKE_COLMAP_VERSION", "COLMAP 4.2.1 (Commit x on y without GPU support)");
   Set("FAKE_COLMAP_SCHEMA", "42");
   Set("FAKE_COLMAP_GROUP", "FeatureMatching");
-  options_.colmap_options = {{"max_ratio", "0.7"}, {"max_error", "3"}};
+  options_.exact.matching.max_ratio = 0.7;
+  options_.colmap_options = {{"max_error", "3"}};
   options_.min_num_inliers = 18;
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("--FeatureMatching.max_ratio=0.7"),
@@ -377,11 +379,6 @@ TEST_F(ExactMatcherTest, PairsWithTooFewMatchesOfTheLargestScalesAreGivenUp) {
   EXPECT_EQ(statistics_.num_matched, 300U);
   EXPECT_EQ(statistics_.num_preempted, 250U);
   EXPECT_EQ(CountInLog("pair"), 50U);
-  Clear();
-  options_.exact.preemptive_min_matches = 11;  // More than there are.
-  EXPECT_TRUE(Verify(AllPairs(25)));
-  EXPECT_EQ(statistics_.num_preempted, 300U);
-  EXPECT_EQ(CountInLog("pair"), 0U);
 }
 
 TEST_F(ExactMatcherTest, MatchesThatAwaitVerificationAreVerifiedAsTheyAre) {
@@ -391,6 +388,48 @@ TEST_F(ExactMatcherTest, MatchesThatAwaitVerificationAreVerifiedAsTheyAre) {
   EXPECT_THAT(Log(), Contains("given 1 2: 30"));
   EXPECT_THAT(Log(), Contains("given 1 6: 1"));
   EXPECT_EQ(statistics_.num_matched, 1U);
+}
+
+TEST_F(ExactMatcherTest, KeysThatColmapNeverWritesAreNoMatches) {
+  // The larger id first.
+  sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
+      .Execute("INSERT INTO matches VALUES(2147483647 * 2 + 1, 1, 2, x'0000000000000000')");
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kEdge);
+  EXPECT_THAT(Log(), Contains("given 1 2: 30"));
+}
+
+TEST_F(ExactMatcherTest, FeaturesThatChangeMeanwhileAreAnError) {
+  Database database(database_path_, sqlite::Access::kReadWrite, 5);
+  const std::vector<ImageRecord> images = database.ReadImages();
+  const WorkDirectory work(directory_.Path());
+  ColmapVerifier verifier(options_, DetectColmap(FAKE_COLMAP_PATH, work.Path(), stop_), database,
+                          images, work.Path(), stop_, [](const std::string&) {});
+  sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
+      .Execute("DELETE FROM descriptors WHERE image_id = 3");
+  try {
+    verifier.Verify(AllPairs(25), [](const VerifiedPair&) {});
+    FAIL();
+  } catch (const DatabaseError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("place0/photo 2.jpg"));
+  }
+  for (const ImagePair& pair : InDatabase()) {
+    EXPECT_NE(pair.id1, 3U);
+    EXPECT_NE(pair.id2, 3U);
+  }
+}
+
+TEST_F(ExactMatcherTest, ImagesWithTooManyFeaturesAreMentioned) {
+  options_.exact.matching.max_num_matches = 29;
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_THAT(warnings_, Contains(HasSubstr("25 images have more than 29 features")));
+  EXPECT_THAT(Log(), Contains("given 1 2: 29"));
+}
+
+TEST_F(ExactMatcherTest, ColmapGetsManyPairsAtATimeThoughFewHaveMatches) {
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  EXPECT_EQ(CountInLog("pair"), 50U);
+  EXPECT_LE(CountInLog("run"), 10U);
 }
 
 TEST_F(ExactMatcherTest, GuidedMatchingNeedsDescriptors) {
@@ -446,7 +485,17 @@ TEST_F(ExactMatcherTest, WrongOptions) {
   options_.exact.preemptive_num_features = 100;
   options_.exact.preemptive_min_matches = 0;
   EXPECT_THROW(options_.Check(), OptionsError);
-  options_.exact.preemptive_min_matches = 1;
+  options_.exact.preemptive_min_matches = 101;  // No pair could have as many.
+  EXPECT_THROW(options_.Check(), OptionsError);
+  options_.exact.preemptive_min_matches = 100;
+  options_.exact.cache_gb = 1e300;
+  options_.Check();
+  options_.exact.cache_gb = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(options_.Check(), OptionsError);
+  options_.exact.cache_gb = 0;
+  options_.colmap_options = {{"max_ratio", "0.7"}};  // Its place is exact.matching.
+  EXPECT_THROW(options_.Check(), OptionsError);
+  options_.colmap_options.clear();
   options_.exact.matching.max_ratio = 0;
   EXPECT_THROW(options_.Check(), OptionsError);
 }

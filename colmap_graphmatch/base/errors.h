@@ -45,7 +45,7 @@ class StoppedError : public Error {
   StoppedError() : Error("The run was stopped.") {}
 };
 
-// The working directory, or any other file that is not a database, cannot be written.
+// The working directory, or any other file that is not a database, cannot be written or read.
 class FileError : public Error {
  public:
   using Error::Error;

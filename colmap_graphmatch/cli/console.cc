@@ -36,7 +36,7 @@ std::string FormatStage(const char* name, const StageStatistics& stage) {
 // Where the time of matching went.
 std::string FormatVerification(const VerifierStatistics& statistics) {
   const double both = statistics.matching_seconds + statistics.colmap_seconds;
-  if (statistics.num_matched == 0 || both <= 0) return "";
+  if (statistics.num_matched == 0) return "";
   const auto num_matched = static_cast<double>(statistics.num_matched);
   std::string text =
       fmt::format("Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
@@ -46,9 +46,8 @@ std::string FormatVerification(const VerifierStatistics& statistics) {
     text += fmt::format("Given up early     {} pairs\n", statistics.num_preempted);
   }
   text += fmt::format("COLMAP             {} pairs in {}, {:.0f} % of matching and verification\n",
-                      statistics.num_matched - statistics.num_unmatched,
-                      FormatDuration(statistics.colmap_seconds),
-                      100 * statistics.colmap_seconds / both);
+                      statistics.num_verified, FormatDuration(statistics.colmap_seconds),
+                      both > 0 ? 100 * statistics.colmap_seconds / both : 0);
   return text;
 }
 

@@ -210,12 +210,12 @@ class Options {
         "on, else exact")(
         "GraphMatching.cache_gb", Field(&exact.cache_gb),
         "GB (>= 0) of descriptors kept in memory; 0: a quarter of the memory. Less reads images "
-        "more often")("GraphMatching.preemptive_num_features",
-                      Field(&exact.preemptive_num_features),
-                      "features (>= 1) of the largest scales that are matched first, to drop pairs "
-                      "without any match early; 0: match all at once")(
+        "more often")(
+        "GraphMatching.preemptive_num_features", Field(&exact.preemptive_num_features),
+        "features (>= 1) of the largest scales that are matched first, to give up pairs "
+        "with few matches early; 0: match all at once")(
         "GraphMatching.preemptive_min_matches", Field(&exact.preemptive_min_matches),
-        "matches (>= 1) of those that keep a pair");
+        "matches (>= 1) of those that a pair needs, or else it counts as tested, without an edge");
 
     po::options_description work("GraphMatch: how COLMAP is run", kLineLength, kHelpLength);
     work.add_options()("GraphMatching.num_processes", Field(&p.verification.num_processes),
@@ -276,6 +276,9 @@ class Options {
     }
     if (values.count("GraphMatching.match_list_path") > 0) {
       line_.pipeline.match_list_path = values["GraphMatching.match_list_path"].as<std::string>();
+      if (line_.pipeline.match_list_path.empty()) {
+        throw OptionsError("--GraphMatching.match_list_path is empty; it must name a file.");
+      }
     }
     for (const ColmapOption& option : kColmapOptions) ReadColmapOption(option, values);
     for (const char* name : kUnusedOptions) {
@@ -315,7 +318,10 @@ class Options {
           p.verification.use_gpu = value;
           return;
         }
-        if (name == "cross_check") matching.cross_check = value;
+        if (name == "cross_check") {
+          matching.cross_check = value;
+          return;
+        }
         text = value ? "1" : "0";
       } else if (option.type == ValueType::kInt) {
         const int value = boost::lexical_cast<int>(text);
@@ -323,15 +329,24 @@ class Options {
           p.num_threads = value;
           return;
         }
-        if (name == "max_num_matches") matching.max_num_matches = value;
+        if (name == "max_num_matches") {
+          matching.max_num_matches = value;
+          return;
+        }
         if (name == "min_num_inliers") {
           p.verification.min_num_inliers = value;
           return;
         }
       } else if (option.type == ValueType::kDouble) {
         const auto value = boost::lexical_cast<double>(text);
-        if (name == "max_ratio") matching.max_ratio = value;
-        if (name == "max_distance") matching.max_distance = value;
+        if (name == "max_ratio") {
+          matching.max_ratio = value;
+          return;
+        }
+        if (name == "max_distance") {
+          matching.max_distance = value;
+          return;
+        }
       }
       p.verification.colmap_options[name] = text;
     } catch (const boost::bad_lexical_cast&) {
@@ -361,13 +376,13 @@ CommandLine ParseCommandLine(int argc, const char* const* argv) {
 }
 
 void PrintHelp(std::ostream& stream) {
-  stream
-      << "graphmatch_matcher --database_path DATABASE [options]\n\n"
-         "Finds which images of a COLMAP database show the same place, has COLMAP match and verify "
-         "them, and\nwrites the two-view geometries to the database, ready for `colmap mapper`. A "
-         "replacement for\n`colmap vocab_tree_matcher` that needs no vocabulary tree.\n\n"
-         "Options"
-      << Options().Visible() << '\n';
+  stream << "graphmatch_matcher --database_path DATABASE [options]\n\n"
+            "Finds which images of a COLMAP database show the same place, matches them, has COLMAP "
+            "verify them, and\nwrites the two-view geometries to the database, ready for `colmap "
+            "mapper`. A "
+            "replacement for\n`colmap vocab_tree_matcher` that needs no vocabulary tree.\n\n"
+            "Options"
+         << Options().Visible() << '\n';
 }
 
 }  // namespace colmap_graphmatch

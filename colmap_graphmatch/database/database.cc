@@ -62,6 +62,12 @@ bool AllZero(const sqlite::Blob& blob) {
   return std::all_of(blob.begin(), blob.end(), [](std::uint8_t byte) { return byte == 0; });
 }
 
+// False for keys that COLMAP never writes, e.g. with the larger id first: they name no pair.
+bool IsColmapsKey(PairId pair_id) {
+  const ImagePair pair = DecodePair(pair_id);
+  return pair.id1 != 0 && EncodePair(pair) == pair_id;
+}
+
 }  // namespace
 
 float Keypoints::Scale(std::size_t row) const {
@@ -229,6 +235,16 @@ Descriptors Database::ReadDescriptors(ImageId image_id) {
   return descriptors;
 }
 
+Descriptors Database::ReadDescriptors(const ImageRecord& image) {
+  Descriptors descriptors = ReadDescriptors(image.id);
+  if (descriptors.num_rows != image.num_features) {
+    throw DatabaseError("The features of image \"" + image.name + "\" (id " +
+                        std::to_string(image.id) + ") in " + Path().string() +
+                        " changed while they were read. Let the other program finish first.");
+  }
+  return descriptors;
+}
+
 Keypoints Database::ReadKeypoints(ImageId image_id) {
   sqlite::Statement select(connection_,
                            "SELECT rows, cols, data FROM keypoints WHERE image_id = ?1");
@@ -256,9 +272,8 @@ std::vector<TestedPair> Database::ReadTestedPairs() {
   while (select.Step()) {
     TestedPair pair;
     const auto pair_id = static_cast<PairId>(select.Int(0));
+    if (!IsColmapsKey(pair_id)) continue;
     pair.pair = DecodePair(pair_id);
-    // Keys that COLMAP never writes, e.g. with the larger id first, name no pair.
-    if (pair.pair.id1 == 0 || EncodePair(pair.pair) != pair_id) continue;
     pair.num_inliers = static_cast<std::size_t>(std::max<std::int64_t>(0, select.Int(1)));
     pair.config = static_cast<int>(select.Int(2));
     tested.push_back(pair);
@@ -271,7 +286,10 @@ std::vector<ImagePair> Database::ReadUnverifiedPairs() {
                            "SELECT pair_id FROM matches WHERE pair_id NOT IN "
                            "(SELECT pair_id FROM two_view_geometries) ORDER BY pair_id");
   std::vector<ImagePair> pairs;
-  while (select.Step()) pairs.push_back(DecodePair(static_cast<PairId>(select.Int(0))));
+  while (select.Step()) {
+    const auto pair_id = static_cast<PairId>(select.Int(0));
+    if (IsColmapsKey(pair_id)) pairs.push_back(DecodePair(pair_id));
+  }
   return pairs;
 }
 

@@ -68,6 +68,9 @@ class Database {
 
   // The features of one image; no rows if it has none.
   Descriptors ReadDescriptors(ImageId image_id);
+
+  // Throws if there are not as many as when the images were listed.
+  Descriptors ReadDescriptors(const ImageRecord& image);
   Keypoints ReadKeypoints(ImageId image_id);
 
   // The pairs that have a row in `two_view_geometries`, ascending. (COLMAP's matchers also ask for

@@ -105,6 +105,17 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
         .Bind(3, *matches)
         .Run();
   }
+  if (!with_descriptors) {
+    sqlite::Statement has_matches(shard, "SELECT 1 FROM main.matches WHERE pair_id = ?1");
+    for (const auto& [pair, matches] : pairs) {
+      const bool found = has_matches.Bind(1, static_cast<std::int64_t>(EncodePair(pair))).Step();
+      has_matches.Reset();
+      if (found) continue;
+      throw DatabaseError("The matches of the images with ids " + std::to_string(pair.id1) +
+                          " and " + std::to_string(pair.id2) + " in " + database_path.string() +
+                          " disappeared. Let the other program finish first.");
+    }
+  }
   transaction.Commit();
 }
 

@@ -27,7 +27,8 @@ struct ShardPair {
 // Copies the cameras, images and keypoints of the pairs' images from the user's database into the
 // empty shard, their descriptors if COLMAP is to match, and the rows of `matches` of those pairs
 // that have some: matches that were made elsewhere and await verification. Adds the matches of the
-// pairs. Ids stay the same. Throws DatabaseError.
+// pairs. Ids stay the same. Throws DatabaseError, also if a pair has neither descriptors nor
+// matches.
 void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
                double lock_timeout_seconds, const std::vector<ShardPair>& pairs,
                bool with_descriptors);

@@ -16,25 +16,24 @@ constexpr std::size_t kImagesPerBlock = 256;
 GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                                 const std::function<void(const LoopProgress&)>& on_progress) {
   GraphBuilder builder(image_ids, verifier, on_progress);
-  builder.AddKnown();
   const std::size_t num = image_ids.size();
-  double num_left = static_cast<double>(num) * static_cast<double>(num > 0 ? num - 1 : 0) / 2 -
-                    static_cast<double>(builder.Graph().NumTested());
+  double num_left = static_cast<double>(num) * static_cast<double>(num > 0 ? num - 1 : 0) / 2;
   for (std::size_t first_a = 0; first_a < num; first_a += kImagesPerBlock) {
     for (std::size_t first_b = first_a; first_b < num; first_b += kImagesPerBlock) {
       std::vector<VertexPair> pairs;
       for (std::size_t a = first_a; a < std::min(first_a + kImagesPerBlock, num); ++a) {
         for (std::size_t b = std::max(first_b, a + 1); b < std::min(first_b + kImagesPerBlock, num);
              ++b) {
-          const VertexPair pair(static_cast<Vertex>(a), static_cast<Vertex>(b));
-          if (!builder.Graph().IsTested(pair.first, pair.second)) pairs.push_back(pair);
+          pairs.emplace_back(static_cast<Vertex>(a), static_cast<Vertex>(b));
         }
       }
       num_left -= static_cast<double>(pairs.size());
       builder.Verify(LoopStage::kListed, 0, pairs, num_left);
-      if (!builder.Continues()) return builder.Finish();
+      if (!builder.Continues()) break;
     }
+    if (!builder.Continues()) break;
   }
+  builder.AddKnown();
   return builder.Finish();
 }
 
@@ -42,7 +41,6 @@ GraphMatchResult VerifyListedPairs(const std::vector<ImagePair>& pairs,
                                    const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                                    const std::function<void(const LoopProgress&)>& on_progress) {
   GraphBuilder builder(image_ids, verifier, on_progress);
-  builder.AddKnown();
   const auto vertex = [&image_ids](ImageId image) -> std::optional<Vertex> {
     const auto place = std::lower_bound(image_ids.begin(), image_ids.end(), image);
     if (place == image_ids.end() || *place != image) return std::nullopt;
@@ -52,12 +50,13 @@ GraphMatchResult VerifyListedPairs(const std::vector<ImagePair>& pairs,
   for (const ImagePair& pair : pairs) {
     const std::optional<Vertex> a = vertex(pair.id1);
     const std::optional<Vertex> b = vertex(pair.id2);
-    if (!a || !b || *a == *b || builder.Graph().IsTested(*a, *b)) continue;
+    if (!a || !b || *a == *b) continue;
     listed.push_back(MakeVertexPair(*a, *b));
   }
   std::sort(listed.begin(), listed.end());
   listed.erase(std::unique(listed.begin(), listed.end()), listed.end());
   builder.Verify(LoopStage::kListed, 0, listed, 0);
+  builder.AddKnown();
   return builder.Finish();
 }
 

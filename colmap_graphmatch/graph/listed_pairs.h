@@ -12,10 +12,12 @@
 namespace colmap_graphmatch {
 
 // Has pairs tested that are given beforehand instead of found by sampling and propagation: all
-// pairs of the images, block of images by block of images, or those of a list. Pairs that the
-// verifier knows are in the graph from the start and not asked for again. image_ids: ascending;
-// pairs of other images, pairs of an image with itself and repeated pairs are left out.
-// Exceptions of the verifier pass through.
+// pairs of the images, block of images by block of images, or those of a list. Known pairs are
+// asked for like all others, in the same batches, so that a run that goes on after an interruption
+// ends like one that was not interrupted; those that were not asked for are added to the graph in
+// the end. image_ids: ascending; pairs of other images, pairs of an image with itself and repeated
+// pairs are left out. Every tested pair takes some 16 bytes. Exceptions of the verifier pass
+// through.
 GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                                 const std::function<void(const LoopProgress&)>& on_progress);
 GraphMatchResult VerifyListedPairs(const std::vector<ImagePair>& pairs,

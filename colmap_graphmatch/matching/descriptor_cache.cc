@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -12,12 +13,19 @@ namespace colmap_graphmatch {
 DescriptorCache::DescriptorCache(std::size_t max_bytes, std::size_t num_readers,
                                  const std::function<Reader()>& make_reader)
     : max_bytes_(max_bytes) {
-  for (std::size_t i = 0; i < num_readers; ++i) {
-    threads_.emplace_back([this, make_reader] { Read(make_reader); });
+  try {
+    for (std::size_t i = 0; i < num_readers; ++i) {
+      threads_.emplace_back([this, make_reader] { Read(make_reader); });
+    }
+  } catch (...) {
+    Close();
+    throw;
   }
 }
 
-DescriptorCache::~DescriptorCache() {
+DescriptorCache::~DescriptorCache() { Close(); }
+
+void DescriptorCache::Close() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     closing_ = true;
@@ -110,26 +118,42 @@ void DescriptorCache::Keep(const std::shared_ptr<Entry>& entry) {
   max_bytes_kept_ = std::max(max_bytes_kept_, bytes_kept_);
 }
 
-std::size_t DefaultCacheBytes() {
-  const long num_pages = ::sysconf(_SC_PHYS_PAGES);
-  const long page_size = ::sysconf(_SC_PAGESIZE);
-  std::size_t bytes = static_cast<std::size_t>(std::max(num_pages, 1L)) *
-                      static_cast<std::size_t>(std::max(page_size, 1L));
-  // The line of the unified hierarchy, "0::/path", and the limits from there up.
-  std::ifstream groups("/proc/self/cgroup");
+std::size_t MemoryLimit(const std::filesystem::path& groups_path,
+                        const std::filesystem::path& groups_root) {
+  std::size_t bytes = std::numeric_limits<std::size_t>::max();
+  // "max", which is no number, stands for no limit.
+  const auto limit_by = [&](const std::filesystem::path& path) {
+    std::size_t limit = 0;
+    if (std::ifstream(path) >> limit) bytes = std::min(bytes, limit);
+  };
+  limit_by(groups_root / "memory.max");
+  limit_by(groups_root / "memory/memory.limit_in_bytes");
+  // "0::/path" in version 2, "9:memory:/path" in version 1; limits of the groups around it hold
+  // too.
+  std::ifstream groups(groups_path);
   for (std::string line; std::getline(groups, line);) {
-    if (line.rfind("0::/", 0) != 0) continue;
-    std::string group = line.substr(3);
-    while (!group.empty()) {
-      std::size_t limit = 0;
-      // "max", which is no number, stands for no limit.
-      if (std::ifstream("/sys/fs/cgroup" + group + "/memory.max") >> limit) {
-        bytes = std::min(bytes, limit);
+    const std::size_t first = line.find(':');
+    const std::size_t second = line.find(':', first + 1);
+    if (second == std::string::npos) continue;
+    const std::string controllers = line.substr(first + 1, second - first - 1);
+    std::string group = line.substr(second + 1);
+    while (group.size() > 1 && group.front() == '/') {
+      if (controllers.empty()) limit_by(groups_root.string() + group + "/memory.max");
+      if (controllers == "memory") {
+        limit_by(groups_root.string() + "/memory" + group + "/memory.limit_in_bytes");
       }
       group.resize(group.find_last_of('/'));
     }
   }
-  return bytes / 4;
+  return bytes;
+}
+
+std::size_t DefaultCacheBytes() {
+  const long num_pages = ::sysconf(_SC_PHYS_PAGES);
+  const long page_size = ::sysconf(_SC_PAGESIZE);
+  const std::size_t physical = static_cast<std::size_t>(std::max(num_pages, 1L)) *
+                               static_cast<std::size_t>(std::max(page_size, 1L));
+  return std::min(physical, MemoryLimit("/proc/self/cgroup", "/sys/fs/cgroup")) / 4;
 }
 
 }  // namespace colmap_graphmatch

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <list>
 #include <memory>
@@ -73,6 +74,7 @@ class DescriptorCache {
   };
   using Entries = std::list<std::shared_ptr<Entry>>;
 
+  void Close();
   void Read(const std::function<Reader()>& make_reader);
   void Keep(const std::shared_ptr<Entry>& entry);
 
@@ -98,7 +100,12 @@ class DescriptorCache {
 };
 
 // A quarter of the memory that this process may use: the machine's, or less if its control group
-// is limited further. In bytes.
+// or one around it is limited further. In bytes.
 std::size_t DefaultCacheBytes();
+
+// The least memory limit of the control groups that groups_path lists (/proc/self/cgroup; version 1
+// or 2), whose files are under groups_root; the greatest number if there is none.
+std::size_t MemoryLimit(const std::filesystem::path& groups_path,
+                        const std::filesystem::path& groups_root);
 
 }  // namespace colmap_graphmatch

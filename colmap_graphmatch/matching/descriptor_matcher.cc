@@ -41,7 +41,7 @@ DescriptorMatcher::DescriptorMatcher(const DescriptorMatchingOptions& options)
       max_ratio_(static_cast<float>(options.max_ratio)),
       max_distance_(static_cast<float>(options.max_distance)) {
   options_.Check();
-  // Half an angle of 2^-12 off, far more than acos may err by.
+  // 2^-12 off, far more than acos may err by.
   const double cosine = max_distance_ < 3 ? std::cos(max_distance_ + 0x1p-12) : -1.0;
   min_product_ = std::max(1, static_cast<std::int32_t>(cosine / kInverseSquaredNorm));
 }

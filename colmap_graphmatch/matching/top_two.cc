@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstring>
+
+#include "colmap_graphmatch/matching/top_two_testing.h"
 
 // AVX-512 with VNNI; Highway leaves it out unless asked.
 #define HWY_WANT_AVX3_DL
@@ -13,6 +16,21 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+// Whether the target is NEON of 64-bit Arm, and whether its dot products can be written. Clang
+// takes no instructions in assembly that it does not compile for.
+#undef GRAPHMATCH_NEON
+#undef GRAPHMATCH_NEON_DOT
+#if HWY_ARCH_ARM_A64 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#define GRAPHMATCH_NEON 1
+#else
+#define GRAPHMATCH_NEON 0
+#endif
+#if GRAPHMATCH_NEON && (defined(__ARM_FEATURE_DOTPROD) || !defined(__clang__))
+#define GRAPHMATCH_NEON_DOT 1
+#else
+#define GRAPHMATCH_NEON_DOT 0
+#endif
+
 // A block of columns (descriptors b) is packed so that a vector has the same entries of as many
 // columns as it has lanes; rows (descriptors a) are broadcast against it. All 128 entries of a tile
 // of rows and columns are summed up in registers. A sum then becomes a key,
@@ -22,12 +40,7 @@
 // so that the maximum over the vectors of a row is at once the greatest product and the first
 // vector that has it, and its lane is the column. A product is at most 128 * 255^2 < 2^23, a key
 // less than 2^31. In a column all keys have the same index: they compare as the products do.
-#if HWY_TARGET == HWY_AVX3_DL
-// Highway 1.0.3 names the 256-bit kind of VNNI here by mistake.
-HWY_PUSH_ATTRIBUTES(HWY_TARGET_STR ",avx512vnni")
-#else
 HWY_BEFORE_NAMESPACE();
-#endif
 namespace colmap_graphmatch {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -38,7 +51,8 @@ constexpr int kIndexBits = 7;
 // Columns of the tile, in vectors.
 constexpr std::size_t kTileVectors = 2;
 
-// Vectors a block: 128 KB or less, which stays in the second-level cache while all rows pass.
+// Vectors a block: 132 KB or less with the fastest arithmetic of a processor (260 KB with AVX-512
+// without VNNI), which stays in the second-level cache while all rows pass.
 constexpr std::size_t kBlockVectors = 64;
 static_assert(kBlockVectors <= std::size_t{1} << kIndexBits);
 
@@ -62,6 +76,8 @@ HWY_INLINE Vector ToKey(Vector product, std::size_t vector) {
 // and has to spill them; twice as slow (docs/benchmarks.md). It also reaches instructions that are
 // newer than the targets of Highway 1.0.
 //
+// Highway numbers better targets lower; those of x86 come before all others.
+//
 // Tiles have 6 rows where there are 16 registers for vectors, and 12 where there are 32.
 
 std::uint32_t FourBytes(const std::uint8_t* entries) {
@@ -70,12 +86,12 @@ std::uint32_t FourBytes(const std::uint8_t* entries) {
   return word;
 }
 
-#if HWY_TARGET == HWY_AVX3_DL || HWY_TARGET == HWY_AVX2
+#if HWY_TARGET <= HWY_AVX3_DL || HWY_TARGET == HWY_AVX2
 // Unsigned times signed bytes, four at a time (VNNI): a is shifted by -128 to be signed, which the
 // start makes good.
 struct ByteArithmetic {
   static constexpr std::size_t kEntries = 4;
-  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_AVX3_DL ? 12 : 6;
+  static constexpr std::size_t kTileRows = HWY_TARGET <= HWY_AVX3_DL ? 12 : 6;
 
   static std::uint32_t PackA(const std::uint8_t* entries) {
     return FourBytes(entries) ^ 0x80808080U;
@@ -85,7 +101,7 @@ struct ByteArithmetic {
     return hn::ShiftLeft<7>(column_sums);
   }
   static HWY_INLINE Vector MulAdd(Vector a, Vector b, Vector sum) {
-#if HWY_TARGET == HWY_AVX3_DL
+#if HWY_TARGET <= HWY_AVX3_DL
     asm("vpdpbusd %[a],%[b],%[sum]" : [sum] "+v"(sum.raw) : [a] "v"(a.raw), [b] "v"(b.raw));
 #else
     asm("%{vex%} vpdpbusd %[a],%[b],%[sum]" : [sum] "+x"(sum.raw) : [a] "x"(a.raw), [b] "x"(b.raw));
@@ -94,7 +110,7 @@ struct ByteArithmetic {
   }
   static HWY_INLINE Vector Key(Vector sum, std::size_t vector) { return ToKey(sum, vector); }
 };
-#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
+#elif GRAPHMATCH_NEON_DOT
 // Unsigned bytes, four at a time (Armv8.2's dot product).
 struct ByteArithmetic {
   static constexpr std::size_t kEntries = 4;
@@ -106,17 +122,21 @@ struct ByteArithmetic {
     return hn::Zero(Tag());
   }
   static HWY_INLINE Vector MulAdd(Vector a, Vector b, Vector sum) {
+#if defined(__ARM_FEATURE_DOTPROD)
+    return Vector(vreinterpretq_s32_u32(vdotq_u32(
+        vreinterpretq_u32_s32(sum.raw), vreinterpretq_u8_s32(a.raw), vreinterpretq_u8_s32(b.raw))));
+#else
     asm(".arch armv8.2-a+dotprod+crypto\n\tudot %[sum].4s,%[a].16b,%[b].16b"
         : [sum] "+w"(sum.raw)
         : [a] "w"(a.raw), [b] "w"(b.raw));
     return sum;
+#endif
   }
   static HWY_INLINE Vector Key(Vector sum, std::size_t vector) { return ToKey(sum, vector); }
 };
 #endif
 
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || \
-    HWY_TARGET == HWY_SSSE3
+#if HWY_TARGET > HWY_AVX3_DL && HWY_TARGET <= HWY_SSSE3
 // Pairs of int16. There is room to have a scaled by 128, and the sum start from the index: the sums
 // are the keys.
 struct Int16Arithmetic {
@@ -148,11 +168,11 @@ struct Int16Arithmetic {
   }
   static HWY_INLINE Vector Key(Vector sum, std::size_t /*vector*/) { return sum; }
 };
-#elif HWY_TARGET != HWY_AVX3_DL
+#elif HWY_TARGET > HWY_SSSE3
 // Single precision, which is exact: every sum stays below 2^24.
 struct FloatArithmetic {
   static constexpr std::size_t kEntries = 1;
-  static constexpr std::size_t kTileRows = HWY_TARGET == HWY_NEON ? 12 : 4;
+  static constexpr std::size_t kTileRows = GRAPHMATCH_NEON ? 12 : 4;
 
   static std::uint32_t PackA(const std::uint8_t* entries) { return PackB(entries); }
   static std::uint32_t PackB(const std::uint8_t* entries) {
@@ -364,20 +384,16 @@ void ComputeWith(const DescriptorView& a, const DescriptorView& b, TopTwoBuffers
 
 void ComputeTopTwoOnTarget(const DescriptorView& a, const DescriptorView& b, bool dot_products,
                            TopTwoBuffers* buffers, TopTwo* result) {
-#if HWY_TARGET == HWY_AVX3_DL
-  static_cast<void>(dot_products);  // Part of the target.
+#if HWY_TARGET == HWY_AVX2 || GRAPHMATCH_NEON_DOT
+  if (dot_products) return ComputeWith<ByteArithmetic>(a, b, buffers, result);
+#else
+  static_cast<void>(dot_products);  // They are part of the target, or there are none.
+#endif
+#if HWY_TARGET <= HWY_AVX3_DL
   ComputeWith<ByteArithmetic>(a, b, buffers, result);
-#elif HWY_TARGET == HWY_AVX2
-  if (dot_products) return ComputeWith<ByteArithmetic>(a, b, buffers, result);
-  ComputeWith<Int16Arithmetic>(a, b, buffers, result);
-#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
-  if (dot_products) return ComputeWith<ByteArithmetic>(a, b, buffers, result);
-  ComputeWith<FloatArithmetic>(a, b, buffers, result);
-#elif HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3
-  static_cast<void>(dot_products);  // There are none.
+#elif HWY_TARGET <= HWY_SSSE3
   ComputeWith<Int16Arithmetic>(a, b, buffers, result);
 #else
-  static_cast<void>(dot_products);
   ComputeWith<FloatArithmetic>(a, b, buffers, result);
 #endif
 }
@@ -386,7 +402,7 @@ void ComputeTopTwoOnTarget(const DescriptorView& a, const DescriptorView& b, boo
 const char* TargetName(bool dot_products) {
 #if HWY_TARGET == HWY_AVX2
   if (dot_products) return "AVX2 with VNNI";
-#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
+#elif GRAPHMATCH_NEON_DOT
   if (dot_products) return "NEON with dot products";
 #endif
   static_cast<void>(dot_products);
@@ -425,7 +441,7 @@ bool DetectDotProducts() {
 #endif
 }
 
-bool dot_products_allowed = true;
+std::atomic<bool> dot_products_allowed{true};
 
 bool UseDotProducts() {
   static const bool detected = DetectDotProducts();

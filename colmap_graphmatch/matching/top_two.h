@@ -42,9 +42,4 @@ void ComputeTopTwo(const DescriptorView& a, const DescriptorView& b, TopTwoBuffe
 // The instruction set that ComputeTopTwo uses on this machine.
 const char* TopTwoTarget();
 
-// Beside Highway's targets, AVX2 and NEON have instructions for dot products of bytes on newer
-// processors, which are used where they exist. For tests and benchmarks of the code without them;
-// not thread-safe.
-void AllowDotProductsForTest(bool allowed);
-
 }  // namespace colmap_graphmatch

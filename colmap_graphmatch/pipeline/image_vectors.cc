@@ -32,17 +32,6 @@ Random ImageRandom(const ImageVectorOptions& options, RandomStage stage, ImageId
   return Random({options.seed, static_cast<std::uint64_t>(stage), image_id});
 }
 
-// The descriptors of an image, as many as there were when the images were listed.
-Descriptors ReadChecked(Database& database, const ImageRecord& image) {
-  Descriptors descriptors = database.ReadDescriptors(image.id);
-  if (descriptors.num_rows != image.num_features) {
-    throw DatabaseError("The features of image \"" + image.name + "\" (id " +
-                        std::to_string(image.id) + ") in " + database.Path().string() +
-                        " changed while they were read. Let the other program finish first.");
-  }
-  return descriptors;
-}
-
 // Calls body(i, what select(image i) returned) for every image, in parallel, while the next images
 // are read.
 template <typename Select, typename Body>
@@ -94,7 +83,7 @@ GmmTraining LearnMixture(const ImageVectorOptions& options, Database& database,
   ForEachImage(
       images, threads, stop,
       [&](const ImageRecord& image) {
-        const Descriptors descriptors = ReadChecked(database, image);
+        const Descriptors descriptors = database.ReadDescriptors(image);
         return SelectedDescriptors(
             descriptors,
             SelectRandom(descriptors.num_rows, per_image,
@@ -117,7 +106,7 @@ std::vector<float> EncodeImages(const ImageVectorOptions& options, const Gaussia
   ForEachImage(
       images, threads, stop,
       [&](const ImageRecord& image) {
-        const Descriptors descriptors = ReadChecked(database, image);
+        const Descriptors descriptors = database.ReadDescriptors(image);
         if (options.feature_selection == ImageVectorOptions::FeatureSelection::kRandom) {
           return SelectedDescriptors(
               descriptors,

@@ -9,7 +9,9 @@ namespace colmap_graphmatch {
 
 PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
   std::unordered_map<std::string, ImageId> ids;
-  for (const ImageRecord& image : images) ids.emplace(image.name, image.id);
+  for (const ImageRecord& image : images) {
+    if (image.num_features > 0) ids.emplace(image.name, image.id);
+  }
 
   std::ifstream file(path);
   if (!file) {
@@ -20,19 +22,28 @@ PairList ReadPairList(const std::filesystem::path& path, const std::vector<Image
   std::size_t line_number = 0;
   for (std::string line; std::getline(file, line);) {
     ++line_number;
-    const std::size_t end = line.find_last_not_of(" \t\r");
-    if (end == std::string::npos || line[0] == '#') continue;
-    line.resize(end + 1);
-    std::size_t num_ways = 0;
-    ImagePair pair;
+    const std::size_t begin = line.find_first_not_of(" \t\r");
+    if (begin == std::string::npos || line[begin] == '#') continue;
+    line = line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin);
+    // Every way to cut it into a name, another, and what may follow, e.g. a score.
     const char separator = line.find('\t') != std::string::npos ? '\t' : ' ';
+    std::vector<std::size_t> cuts;
     for (std::size_t cut = line.find(separator); cut != std::string::npos;
          cut = line.find(separator, cut + 1)) {
-      const auto first = ids.find(line.substr(0, cut));
-      const auto second = ids.find(line.substr(cut + 1));
-      if (first == ids.end() || second == ids.end()) continue;
-      pair = ImagePair(first->second, second->second);
-      ++num_ways;
+      cuts.push_back(cut);
+    }
+    cuts.push_back(line.size());
+    std::size_t num_ways = 0;
+    ImagePair pair;
+    for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+      const auto first = ids.find(line.substr(0, cuts[i]));
+      if (first == ids.end()) continue;
+      for (std::size_t j = i + 1; j < cuts.size(); ++j) {
+        const auto second = ids.find(line.substr(cuts[i] + 1, cuts[j] - cuts[i] - 1));
+        if (second == ids.end()) continue;
+        pair = ImagePair(first->second, second->second);
+        ++num_ways;
+      }
     }
     if (num_ways > 1) {
       throw FileError("Line " + std::to_string(line_number) + " of " + path.string() +
@@ -46,6 +57,11 @@ PairList ReadPairList(const std::filesystem::path& path, const std::vector<Image
     list.pairs.push_back(pair);
   }
   if (file.bad()) throw FileError("Cannot read " + path.string() + " to its end.");
+  if (list.pairs.empty() && list.num_skipped > 0) {
+    throw FileError("No line of " + path.string() +
+                    " names two images with features of this database; the first is \"" +
+                    list.first_skipped + "\". Are these names as in the table `images`?");
+  }
   return list;
 }
 

@@ -13,15 +13,17 @@ namespace colmap_graphmatch {
 struct PairList {
   std::vector<ImagePair> pairs;  // As listed; a pair may be there twice.
 
-  // Lines that name an image that the database does not have, or the same image twice.
+  // Lines that name an image that the database does not have, or has no features of, or the same
+  // image twice.
   std::size_t num_skipped = 0;
   std::string first_skipped;
 };
 
 // Reads a list of image pairs as COLMAP's matches_importer takes it: two names a line, with a space
-// (or a tab) between them; empty lines and those that begin with # are comments. Names may contain
-// spaces (there, COLMAP fails) as long as only one way to cut the line in two gives two images.
-// Throws FileError if the file cannot be read, or if a line can be cut in several ways.
+// (or a tab) between them, and anything, like a score, after them; empty lines and those that begin
+// with # are comments. Names may contain spaces (there, COLMAP fails) as long as only one way to
+// cut the line gives two images. Throws FileError if the file cannot be read, if a line can be cut
+// in several ways, or if none of its lines names a pair.
 PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
 
 }  // namespace colmap_graphmatch

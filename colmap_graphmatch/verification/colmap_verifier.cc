@@ -1,9 +1,11 @@
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <boost/asio/post.hpp>
 #include <boost/asio/thread_pool.hpp>
+#include <charconv>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -28,6 +30,10 @@ constexpr std::size_t kShardsPerBatch = 64;
 // Below this the start of COLMAP and the copy of the features would cost more than a few per cent.
 constexpr std::size_t kMinPairsPerShard = 8;
 
+// How many times as many pairs are matched here at a time as COLMAP gets at most: where pairs are
+// rare that have enough matches, COLMAP would otherwise be started for one or two of them.
+constexpr std::size_t kPairsMatchedPerVerified = 4;
+
 // Runs of COLMAP on the same pairs before they are split or given up: a second try gets past what
 // was not their fault (memory, a signal).
 constexpr int kTries = 2;
@@ -46,10 +52,11 @@ constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
 
 // Pairs that share images come into the same shard, and shards that do follow each other.
 std::vector<std::vector<ImagePair>> CutIntoShards(std::vector<ImagePair> pairs,
+                                                  std::size_t min_pairs_per_shard,
                                                   std::size_t max_pairs_per_shard) {
   SortForReuse(&pairs);
   const std::size_t wanted = (pairs.size() + kShardsPerBatch - 1) / kShardsPerBatch;
-  const std::size_t size = std::min(std::max(wanted, kMinPairsPerShard), max_pairs_per_shard);
+  const std::size_t size = std::min(std::max(wanted, min_pairs_per_shard), max_pairs_per_shard);
   std::vector<std::vector<ImagePair>> shards;
   for (std::size_t first = 0; first < pairs.size(); first += size) {
     const auto begin = pairs.begin() + static_cast<std::ptrdiff_t>(first);
@@ -59,11 +66,32 @@ std::vector<std::vector<ImagePair>> CutIntoShards(std::vector<ImagePair> pairs,
   return shards;
 }
 
+// COLMAP's options for what differs from its defaults.
+void AddMatchingOptions(const DescriptorMatchingOptions& matching,
+                        std::map<std::string, std::string>* colmap_options) {
+  const DescriptorMatchingOptions defaults;
+  const auto add = [&](const char* name, auto value, auto default_value) {
+    if (value == default_value) return;
+    // The shortest text that stands for the same number.
+    std::array<char, 32> text = {};
+    const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
+    (*colmap_options)[name] = std::string(text.data(), end);
+  };
+  add("max_ratio", matching.max_ratio, defaults.max_ratio);
+  add("max_distance", matching.max_distance, defaults.max_distance);
+  add("cross_check", matching.cross_check ? 1 : 0, defaults.cross_check ? 1 : 0);
+  add("max_num_matches", matching.max_num_matches, defaults.max_num_matches);
+}
+
 }  // namespace
 
 void ColmapVerifierOptions::Check() const {
   EffectiveNumThreads(num_threads);
   exact.Check();
+  for (const char* name : {"max_ratio", "max_distance", "cross_check", "max_num_matches"}) {
+    if (colmap_options.count(name) == 0) continue;
+    throw OptionsError(std::string(name) + " is an option of exact.matching.");
+  }
   if (num_processes < 0) {
     throw OptionsError("The number of COLMAP processes must be positive, or 0 to have it chosen.");
   }
@@ -129,7 +157,7 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
 
   if (exact) {
     exact_matcher_ =
-        std::make_unique<ExactMatcher>(options.exact, database.Path(), options.lock_timeout,
+        std::make_unique<ExactMatcher>(options.exact, database.Path(), images, options.lock_timeout,
                                        static_cast<std::size_t>(num_processes_));
     unverified_ = database.ReadUnverifiedPairs();
     // Guided matching is COLMAP's: it matches once more where the geometry says so.
@@ -137,7 +165,10 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
     shards_with_descriptors_ = guided != options.colmap_options.end() && guided->second != "0";
   }
 
+  WarnOfCutFeatures(images);
+
   std::map<std::string, std::string> colmap_options = options.colmap_options;
+  AddMatchingOptions(options.exact.matching, &colmap_options);
   colmap_options["use_gpu"] = options_.use_gpu ? "1" : "0";
   colmap_options["num_threads"] = std::to_string(threads_per_process_);
   colmap_options["min_num_inliers"] = std::to_string(options.min_num_inliers);
@@ -184,6 +215,17 @@ void ColmapVerifier::CheckThatColmapWorks(const std::vector<PairRows>& results,
                                         : "") +
                       "\nWhat was verified before is kept.");
   }
+}
+
+void ColmapVerifier::WarnOfCutFeatures(const std::vector<ImageRecord>& images) const {
+  if (!exact_matcher_) return;
+  const int limit = options_.exact.matching.max_num_matches;
+  const auto num_cut = std::count_if(images.begin(), images.end(), [&](const ImageRecord& image) {
+    return image.num_features > static_cast<std::size_t>(limit);
+  });
+  if (num_cut == 0) return;
+  on_warning_(std::to_string(num_cut) + " images have more than " + std::to_string(limit) +
+              " features (max_num_matches); only so many of each are matched.");
 }
 
 VerifierStatistics ColmapVerifier::Statistics() const {
@@ -273,6 +315,10 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
   command.insert(command.end(), arguments_.begin(), arguments_.end());
   const SubprocessResult run = RunSubprocess(
       command, output_path, timeout, [&] { return stop_.Abandon() || batch->abort.load(); });
+  {
+    const std::lock_guard<std::mutex> lock(batch->mutex);
+    statistics_.colmap_seconds += run.seconds;
+  }
   if (run.ending == SubprocessResult::Ending::kStopped) return run.Describe();
 
   std::string problem;
@@ -296,7 +342,7 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
     return problem;
   }
   const std::lock_guard<std::mutex> lock(batch->mutex);
-  statistics_.colmap_seconds += run.seconds;
+  statistics_.num_verified += pairs.size();
   slowest_seconds_per_pair_ =
       std::max(slowest_seconds_per_pair_, run.seconds / static_cast<double>(pairs.size()));
   return "";
@@ -339,7 +385,13 @@ void ColmapVerifier::Work(Batch* batch) {
         batch->shards.pop_front();
       }
       const std::vector<ShardPair> to_verify = Match(shard, batch);
-      if (!to_verify.empty()) ProcessShard(to_verify, batch);
+      const auto size = static_cast<std::size_t>(options_.max_pairs_per_shard);
+      for (std::size_t first = 0; first < to_verify.size(); first += size) {
+        if (first > 0 && stop_.Requested()) break;
+        const auto begin = to_verify.begin() + static_cast<std::ptrdiff_t>(first);
+        const std::size_t num = std::min(size, to_verify.size() - first);
+        ProcessShard({begin, begin + static_cast<std::ptrdiff_t>(num)}, batch);
+      }
     }
   } catch (...) {
     const std::lock_guard<std::mutex> lock(batch->mutex);
@@ -357,8 +409,10 @@ bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
   // Shards are cut before known pairs are taken out: a run that goes on after an interruption then
   // gives COLMAP the same shards, and gets the same answers, as one that was never interrupted.
   std::size_t num_unanswered = 0;
+  const std::size_t factor = MatchesHere() ? kPairsMatchedPerVerified : 1;
   for (std::vector<ImagePair>& shard :
-       CutIntoShards(pairs, static_cast<std::size_t>(options_.max_pairs_per_shard))) {
+       CutIntoShards(pairs, factor * kMinPairsPerShard,
+                     factor * static_cast<std::size_t>(options_.max_pairs_per_shard))) {
     const auto unknown_end = std::stable_partition(
         shard.begin(), shard.end(),
         [this](const ImagePair& pair) { return FindPair(known_, pair) == nullptr; });

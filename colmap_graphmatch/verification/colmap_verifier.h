@@ -21,7 +21,8 @@
 namespace colmap_graphmatch {
 
 struct ColmapVerifierOptions {
-  // Who matches descriptors. kAuto: COLMAP if it has a GPU and may use it, else this library.
+  // Who matches descriptors; COLMAP gets the options of exact.matching. kAuto: COLMAP if it has a
+  // GPU and may use it, else this library.
   enum class Matcher { kAuto, kExact, kColmap };
   Matcher matcher = Matcher::kAuto;
 
@@ -42,8 +43,8 @@ struct ColmapVerifierOptions {
   int min_num_inliers = 15;
 
   // Other options of COLMAP's feature matching and geometric verification, by their names without a
-  // group (e.g. "max_ratio"), as COLMAP is to get them. What is not here keeps COLMAP's own
-  // default.
+  // group (e.g. "max_error"), as COLMAP is to get them. What is not here keeps COLMAP's own
+  // default. Those of exact.matching do not belong here: COLMAP gets them from there.
   std::map<std::string, std::string> colmap_options;
 
   // Pairs a shard at most, the amount of work that a crash of COLMAP or kill -9 can lose.
@@ -70,10 +71,11 @@ struct VerifierStatistics {
   std::size_t num_matched = 0;    // Pairs whose descriptors were matched here,
   std::size_t num_preempted = 0;  // those of them given up after the features of largest scale,
   std::size_t num_unmatched = 0;  // and those with fewer matches than an edge needs inliers.
+  std::size_t num_verified = 0;   // Pairs that COLMAP verified.
   std::size_t num_image_reads = 0;
 };
 
-// Has pairs matched and verified, in shards (see docs/design.md), and writes every finished
+// Has pairs matched and verified, in shards (see docs/design.md), and writes what COLMAP found in a
 // shard to the user's database in one transaction. Descriptors are matched here or by COLMAP; the
 // geometric verification is always COLMAP's. Pairs with fewer matches here than an edge needs
 // inliers never reach COLMAP and get the rows that it would write.
@@ -119,6 +121,7 @@ class ColmapVerifier : public PairVerifier {
   std::string TryShard(const std::vector<ShardPair>& pairs, Batch* batch,
                        std::vector<PairRows>* results);
   void ThrowIfDiskIsFull() const;
+  void WarnOfCutFeatures(const std::vector<ImageRecord>& images) const;
   // Throws ColmapError once COLMAP has failed on pairs that have nothing in common.
   void CheckThatColmapWorks(const std::vector<PairRows>& results,
                             const std::vector<Failure>& failures);

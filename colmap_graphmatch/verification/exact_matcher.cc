@@ -1,19 +1,21 @@
 #include "colmap_graphmatch/verification/exact_matcher.h"
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
+#include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/largest_scales.h"
-#include "colmap_graphmatch/database/database.h"
 
 namespace colmap_graphmatch {
 namespace {
 
-// Pairs whose images are on their way while one is matched: reading an image takes much less time
-// than matching a pair, unless the disk is slow.
+// The pair that is matched, and those after it whose images are on their way meanwhile: reading an
+// image takes much less time than matching a pair, unless the disk is slow.
 constexpr std::size_t kLookahead = 4;
 
 // A thread that reads keeps up with many that match.
@@ -22,26 +24,44 @@ std::size_t NumReaders(std::size_t num_threads) {
 }
 
 std::size_t CacheBytes(double cache_gb) {
-  return cache_gb > 0 ? static_cast<std::size_t>(cache_gb * 1e9) : DefaultCacheBytes();
+  if (cache_gb == 0) return DefaultCacheBytes();
+  constexpr auto kMost = std::numeric_limits<std::size_t>::max() / 2;
+  const double bytes = cache_gb * 1e9;
+  return bytes < static_cast<double>(kMost) ? static_cast<std::size_t>(bytes) : kMost;
+}
+
+std::map<ImageId, ImageRecord> ById(const std::vector<ImageRecord>& images) {
+  std::map<ImageId, ImageRecord> by_id;
+  for (const ImageRecord& image : images) by_id.emplace(image.id, image);
+  return by_id;
 }
 
 }  // namespace
 
 void ExactMatcherOptions::Check() const {
   matching.Check();
-  if (!(cache_gb >= 0)) throw OptionsError("cache_gb must be positive, or 0 to have it chosen.");
+  if (!(cache_gb >= 0 && std::isfinite(cache_gb))) {
+    throw OptionsError("cache_gb must be positive, or 0 to have it chosen.");
+  }
   if (preemptive_num_features < 0) {
     throw OptionsError("preemptive_num_features must be positive, or 0 to match all features.");
   }
   if (preemptive_min_matches < 1) {
     throw OptionsError("preemptive_min_matches must be at least 1.");
   }
+  if (preemptive_num_features > 0 && preemptive_min_matches > preemptive_num_features) {
+    throw OptionsError("preemptive_min_matches is " + std::to_string(preemptive_min_matches) +
+                       ", more than the " + std::to_string(preemptive_num_features) +
+                       " features that are matched first: no pair could pass.");
+  }
 }
 
 ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
-                           const std::filesystem::path& database_path, double lock_timeout_seconds,
+                           const std::filesystem::path& database_path,
+                           const std::vector<ImageRecord>& images, double lock_timeout_seconds,
                            std::size_t num_threads)
     : options_(options),
+      images_(ById(images)),
       cache_(CacheBytes(options.cache_gb), NumReaders(num_threads),
              [this, database_path, lock_timeout_seconds]() -> DescriptorCache::Reader {
                const auto database = std::make_shared<Database>(
@@ -51,7 +71,7 @@ ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
              }) {}
 
 MatchingFeatures ExactMatcher::ReadFeatures(Database* database, ImageId image) const {
-  Descriptors descriptors = database->ReadDescriptors(image);
+  Descriptors descriptors = database->ReadDescriptors(images_.at(image));
   MatchingFeatures features;
   if (options_.preemptive_num_features > 0) {
     features.largest_scales = descriptors.CopyRows(

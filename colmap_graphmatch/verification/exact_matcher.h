@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <vector>
 
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/matching/descriptor_cache.h"
 #include "colmap_graphmatch/matching/descriptor_matcher.h"
 
@@ -19,10 +21,10 @@ struct ExactMatcherOptions {
   // fit is read again, with the same result.
   double cache_gb = 0;
 
-  // Match this many features of the largest scales first, and take a pair for unmatched if fewer
-  // than preemptive_min_matches of them match (Wu, Towards Linear-Time Incremental Structure from
-  // Motion, 3DV 2013, section 3.1). 0: match all features of every pair. Faster, and loses weak
-  // edges (docs/benchmarks.md).
+  // Match this many features of the largest scales first, and take a pair for unmatched, tested
+  // like any other, if fewer than preemptive_min_matches (at most as many) of them match (Wu,
+  // Towards Linear-Time Incremental Structure from Motion, 3DV 2013, section 3.1). 0: match all
+  // features of every pair. Faster, and loses weak edges (docs/benchmarks.md).
   int preemptive_num_features = 0;
   int preemptive_min_matches = 2;
 
@@ -33,13 +35,15 @@ struct ExactMatcherOptions {
 // Matches the descriptors of pairs of images of a database. Thread-safe.
 class ExactMatcher {
  public:
-  // num_threads: how many will call Match at a time. Nothing is read yet.
+  // images: those of the database. num_threads: how many will call Match at a time. Nothing is read
+  // yet.
   ExactMatcher(const ExactMatcherOptions& options, const std::filesystem::path& database_path,
-               double lock_timeout_seconds, std::size_t num_threads);
+               const std::vector<ImageRecord>& images, double lock_timeout_seconds,
+               std::size_t num_threads);
 
   // The matches of every pair, on the calling thread alone, while the images of the pairs that come
   // next are read. Returns false if should_stop, which is asked before every pair, ended it early.
-  // Throws DatabaseError.
+  // Throws DatabaseError, also if an image has not as many features as it had.
   bool Match(const std::vector<ImagePair>& pairs, const std::function<bool()>& should_stop,
              std::vector<std::vector<FeatureMatch>>* matches);
 
@@ -51,9 +55,10 @@ class ExactMatcher {
   std::size_t NumReads() const { return cache_.NumReads(); }
 
  private:
-  MatchingFeatures ReadFeatures(class Database* database, ImageId image) const;
+  MatchingFeatures ReadFeatures(Database* database, ImageId image) const;
 
   ExactMatcherOptions options_;
+  std::map<ImageId, ImageRecord> images_;
   DescriptorCache cache_;
   std::atomic<std::size_t> num_pairs_{0};
   std::atomic<std::size_t> num_preempted_{0};

@@ -32,11 +32,11 @@ struct Peak {
   std::function<double(std::int64_t num)> run;
 };
 
-#if HWY_ARCH_X86
+#if HWY_ARCH_X86_64
 #define GRAPHMATCH_REPEAT_12(f) f(0) f(1) f(2) f(3) f(4) f(5) f(6) f(7) f(8) f(9) f(10) f(11)
 #define GRAPHMATCH_LOOP(instruction) \
   asm volatile("1:\n\t" GRAPHMATCH_REPEAT_12(instruction) "dec %0\n\t"                 \
-                                                          "jnz 1b"                     \
+                                                          "jnz 1b\n\tvzeroupper"      \
                : "+r"(num)                                                             \
                :                                                                       \
                : "cc", "xmm0", "xmm1", "xmm2", "xmm3", "xmm4", "xmm5", "xmm6", "xmm7", \
@@ -53,7 +53,9 @@ struct Peak {
 
 // Registers are zeroed: what they happen to contain could be slow to add up.
 double FloatPeak(std::int64_t num) {
-  asm volatile("vzeroall" ::: "xmm0");
+  asm volatile("vzeroall" ::
+                   : "xmm0", "xmm1", "xmm2", "xmm3", "xmm4", "xmm5", "xmm6", "xmm7", "xmm8", "xmm9",
+                     "xmm10", "xmm11", "xmm12", "xmm13", "xmm14", "xmm15");
   GRAPHMATCH_LOOP(GRAPHMATCH_FMA);
   return 12 * 8;
 }
@@ -114,8 +116,8 @@ void Main(std::size_t num_features, int num_runs) {
     for (std::size_t i = 0; i < peaks.size(); ++i) {
       constexpr std::int64_t kSteps = 20000000;
       const Stopwatch stopwatch;
-      const double rate = peaks[i].run(kSteps) * kSteps / stopwatch.Seconds();
-      if (run > 0) peak_rates[i].push_back(rate);
+      const double products = peaks[i].run(kSteps) * kSteps;
+      if (run > 0) peak_rates[i].push_back(products / stopwatch.Seconds());
     }
     for (std::size_t i = 0; i < targets.size(); ++i) {
       targets[i].Use();
@@ -156,6 +158,6 @@ void Main(std::size_t num_features, int num_runs) {
 
 int main(int argc, char** argv) {
   colmap_graphmatch::Main(argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 5800,
-                          argc > 2 ? std::atoi(argv[2]) : 5);
+                          std::max(1, argc > 2 ? std::atoi(argv[2]) : 5));
   return 0;
 }

@@ -57,6 +57,7 @@ void Main(const char* path) {
   DescriptorMatcher matcher{DescriptorMatchingOptions()};
   std::vector<PairResult> results;
   for (const TestedPair& tested : database.ReadTestedPairs()) {
+    if (images.count(tested.pair.id1) + images.count(tested.pair.id2) < 2) continue;
     const ImageFeatures& a = images.at(tested.pair.id1);
     const ImageFeatures& b = images.at(tested.pair.id2);
     PairResult result;

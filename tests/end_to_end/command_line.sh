@@ -86,6 +86,30 @@ expect_exit 0 'Descriptors are matched exactly' "$matcher" --database_path "$wor
   --colmap_path "$fake" --GraphMatching.cache_gb 0.000001
 tested_pairs "$work/cache.db" | cmp - "$work/undisturbed.txt"
 
+echo "== COLMAP's options of matching reach the matcher here"
+# colmaps_pairs OPTION...: the pairs with enough matches, of the 180 within a place.
+colmaps_pairs() {
+  cp "$work/untouched.db" "$work/options.db"
+  "$matcher" --database_path "$work/options.db" --colmap_path "$fake" \
+    --GraphMatching.strategy exhaustive "$@" 2>/dev/null | sed -n -E 's/^COLMAP +([0-9]+) pairs.*/\1/p'
+}
+expect_pairs() {
+  local expected=$1 found
+  shift
+  found=$(colmaps_pairs "$@")
+  [[ $found == "$expected" ]] || fail "$found pairs, not $expected: $*"
+}
+expect_pairs 180
+expect_pairs 0 --SiftMatching.max_distance 0.001
+expect_pairs 0 --SiftMatching.max_ratio 0.01
+expect_pairs 0 --FeatureMatching.max_num_matches 5
+expect_pairs 0 --GraphMatching.preemptive_num_features 3 --GraphMatching.preemptive_min_matches 3 \
+  --SiftMatching.max_ratio 0.01
+# Without the cross check and without limits every feature matches, in all pairs.
+expect_pairs 780 --SiftMatching.cross_check 0 --SiftMatching.max_ratio 10 --SiftMatching.max_distance 4
+expect_exit 1 'no pair could pass' "${run[@]}" --GraphMatching.preemptive_num_features 3 \
+  --GraphMatching.preemptive_min_matches 4
+
 echo "== All pairs, and those of a list"
 cp "$work/untouched.db" "$work/exhaustive.db"
 expect_exit 0 'Pairs tested       780 of 780' "$matcher" --database_path "$work/exhaustive.db" \
@@ -93,6 +117,8 @@ expect_exit 0 'Pairs tested       780 of 780' "$matcher" --database_path "$work/
 check_integrity "$work/exhaustive.db"
 expect_exit 0 'Pairs tested       0 of 780' "$matcher" --database_path "$work/exhaustive.db" \
   --colmap_path "$fake" --GraphMatching.strategy exhaustive
+grep -q 'Nothing is left to test' "$work/output.txt" || fail "no word that nothing is left"
+expect_exit 1 'is empty' "${run[@]}" --GraphMatching.match_list_path ''
 cp "$work/untouched.db" "$work/listed.db"
 cat >"$work/pairs.txt" <<END
 # two names a line

@@ -23,6 +23,21 @@ expect_exit() {
   grep -q -F -- "$text" "$work/output.txt" || { cat "$work/output.txt"; fail "no '$text': $*"; }
 }
 
+# spelling COMMAND OPTION: what the installed COLMAP calls an option, e.g. --SiftMatching.use_gpu.
+spelling() {
+  local options
+  options=$(colmap "$1" -h 2>&1)
+  grep -o -m 1 -E -- "--[A-Za-z]+\.$2\b" <<<"$options"
+}
+
+# extract DATABASE IMAGES FEATURES SIZE: features by the installed COLMAP.
+extract() {
+  colmap feature_extractor --database_path "$1" --image_path "$2" "$(spelling feature_extractor use_gpu)" 0 \
+    "$(spelling feature_extractor max_num_features)" "$3" \
+    "$(spelling feature_extractor max_image_size)" "$4" >"$work/extraction.log" 2>&1 ||
+    { tail -n 5 "$work/extraction.log"; fail "colmap feature_extractor"; }
+}
+
 # The tested pairs of a database with their outcomes, one a line.
 tested_pairs() {
   sqlite3 "$1" 'SELECT pair_id, rows > 0 FROM two_view_geometries ORDER BY pair_id'

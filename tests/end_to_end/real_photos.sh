@@ -17,11 +17,7 @@ awk -F '\t' '$2 ~ /^(entry|fountain|kermit|vggsfm_statue)$/ { print $1 "\t" $2 }
 cut -f 1 "$work/scenes.tsv" | while read -r name; do cp "$photos/dev/$name" "$work/images/"; done
 echo "$(wc -l <"$work/scenes.tsv") photos"
 
-options=$(colmap feature_extractor -h 2>&1)
-spelling() { grep -o -m 1 -E -- "--[A-Za-z]+\.$1\b" <<<"$options"; }
-colmap feature_extractor --database_path "$work/features.db" --image_path "$work/images" \
-  "$(spelling use_gpu)" 0 "$(spelling max_num_features)" 1024 "$(spelling max_image_size)" 800 \
-  >"$work/extraction.log" 2>&1
+extract "$work/features.db" "$work/images" 1024 800
 
 # recall DATABASE: the share of the strong true edges (50 inliers and more at full size) that it has, and a
 # failure if it has an edge between places that share nothing.
@@ -86,9 +82,8 @@ sqlite3 -separator ' ' "$work/undisturbed.db" "SELECT a.name, b.name FROM matche
   JOIN images a ON a.image_id = m.pair_id / 2147483647
   JOIN images b ON b.image_id = m.pair_id % 2147483647
   WHERE m.rows = 0 ORDER BY m.pair_id LIMIT 20" >"$work/unmatched.txt"
-options=$(colmap matches_importer -h 2>&1)
 colmap matches_importer --database_path "$work/unmatched.db" --match_list_path "$work/unmatched.txt" \
-  --match_type pairs "$(spelling use_gpu)" 0 >"$work/unmatched.log" 2>&1
+  --match_type pairs "$(spelling matches_importer use_gpu)" 0 >"$work/unmatched.log" 2>&1
 rows() {
   for table in matches two_view_geometries; do
     columns=$(sqlite3 "$1" "SELECT group_concat('quote(' || name || ')', ', ') FROM pragma_table_info('$table')")
@@ -127,6 +122,21 @@ echo "interrupted at $(count_tested "$work/disturbed.db") pairs"
 expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/disturbed.db"
 check "$work/disturbed.db"
 content "$work/disturbed.db" | cmp - "$work/undisturbed.content" || fail "another result after a disturbance"
+
+echo "== All pairs, interrupted: the same as undisturbed"
+cp "$work/features.db" "$work/exhaustive.db"
+"$matcher" --database_path "$work/exhaustive.db" --GraphMatching.strategy exhaustive >"$work/exhaustive.txt" 2>&1
+content "$work/exhaustive.db" >"$work/exhaustive.content"
+cp "$work/features.db" "$work/interrupted.db"
+"$matcher" --database_path "$work/interrupted.db" --GraphMatching.strategy exhaustive \
+  >"$work/interrupted.txt" 2>&1 &
+pid=$!
+while kill -0 "$pid" 2>/dev/null && (($(count_tested "$work/interrupted.db") < 100)); do sleep 0.05; done
+kill -INT "$pid"
+wait "$pid" || true
+echo "interrupted at $(count_tested "$work/interrupted.db") pairs"
+expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/interrupted.db" --GraphMatching.strategy exhaustive
+content "$work/interrupted.db" | cmp - "$work/exhaustive.content" || fail "another result after an interruption"
 
 echo "== The mapper"
 mkdir "$work/sparse"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "colmap_graphmatch/matching/top_two.h"
+#include "colmap_graphmatch/matching/top_two_testing.h"
 
 namespace colmap_graphmatch {
 
