@@ -19,6 +19,8 @@ echo "$(wc -l <"$work/scenes.tsv") photos"
 
 extract "$work/features.db" "$work/images" 1024 800
 
+"$build/tests/check_matching" "$work/features.db" 30
+
 # recall DATABASE: the share of the strong true edges (50 inliers and more at full size) that it has, and a
 # failure if it has an edge between places that share nothing.
 recall() {

@@ -9,6 +9,8 @@ command -v colmap >/dev/null || { echo "COLMAP is not installed."; exit 77; }
 "$root/scripts/demo" --build_path "$build" --output "$work/demo"
 check_integrity "$work/demo/database.db"
 
+"$build/tests/check_matching" "$work/demo/database.db" 12
+
 models=()
 for model in "$work"/demo/sparse/*/; do
   text=$work/text/$(basename "$model")

@@ -1,9 +1,13 @@
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/version.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/matching/descriptor_cache.h"
+#include "colmap_graphmatch/matching/descriptor_matcher.h"
+#include "colmap_graphmatch/matching/pair_order.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
 
@@ -20,9 +24,13 @@ class Silent : public gm::PipelineObserver {
 
 }  // namespace
 
-// Three photos in a row, of which the neighbours match: the loop has to find both edges. And the
-// whole pipeline links and reports a database that is not there.
+// Three photos in a row, of which the neighbours match: the loop has to find both edges. A
+// descriptor matches itself. And the whole pipeline links and reports a database that is not there.
 int main() {
+  const std::vector<unsigned char> descriptor(gm::kDescriptorDim, 45);
+  gm::DescriptorMatcher matcher{gm::DescriptorMatchingOptions()};
+  if (matcher.Match({descriptor.data(), 1}, {descriptor.data(), 1}).size() != 1) return 1;
+
   gm::ThreadPool threads(2);
   const gm::Ranking ranking({}, 3, 2, {1, 0, 0.8F, 0.6F, 0, 1}, threads);
   gm::ReplayVerifier verifier({{gm::ImagePair(1, 2), 30}, {gm::ImagePair(2, 3), 40}});
