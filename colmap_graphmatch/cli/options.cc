@@ -1,11 +1,16 @@
 #include "colmap_graphmatch/cli/options.h"
 
+#include <algorithm>
 #include <array>
 #include <boost/lexical_cast.hpp>
 #include <boost/program_options.hpp>
 #include <cstdint>
+#include <fstream>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <ostream>
+#include <set>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -153,6 +158,8 @@ class Options {
     general.add_options()("help,h", "print this help")("version", "print the version")(
         "database_path", po::value<std::string>(),
         "the COLMAP database with the features; the matches are written to it")(
+        "project_path", po::value<std::string>(),
+        "an ini file with options, as COLMAP writes it; the command line goes before")(
         "colmap_path", Field(&p.colmap_path), "the COLMAP program: a path, or a name on PATH")(
         "random_seed", Field(&p.seed),
         "of this program's random choices; COLMAP's CPU matching has its own");
@@ -251,12 +258,22 @@ class Options {
     po::options_description all;
     all.add(visible_).add(hidden_);
     po::variables_map values;
+    std::set<std::string> given;
     try {
-      po::store(po::parse_command_line(argc, argv, all), values);
+      const po::parsed_options parsed = po::parse_command_line(argc, argv, all);
+      po::store(parsed, values);
       line_.help = values.count("help") > 0;
       line_.version = values.count("version") > 0;
       if (line_.help || line_.version) return line_;
+      for (const po::option& option : parsed.options) given.insert(option.string_key);
+      if (values.count("project_path") > 0) {
+        StoreProject(values["project_path"].as<std::string>(), all, given, &values);
+      }
       po::notify(values);
+    } catch (const po::unknown_option& error) {
+      throw OptionsError(std::string(error.what()) + ". Did you mean --" +
+                         NearestOption(error.get_option_name(), all) +
+                         "? `graphmatch_matcher -h` lists the options.");
     } catch (const po::error& error) {
       throw OptionsError(std::string(error.what()) +
                          ". `graphmatch_matcher -h` lists the options.");
@@ -282,7 +299,8 @@ class Options {
     }
     for (const ColmapOption& option : kColmapOptions) ReadColmapOption(option, values);
     for (const char* name : kUnusedOptions) {
-      if (values.count(name) > 0) line_.unused_options.emplace_back(name);
+      // Not those of a project file: COLMAP writes every option into it.
+      if (given.count(name) > 0) line_.unused_options.emplace_back(name);
     }
     line_.pipeline.verification.num_threads = line_.pipeline.num_threads;
     line_.pipeline.Check();
@@ -292,6 +310,68 @@ class Options {
   const po::options_description& Visible() const { return visible_; }
 
  private:
+  // Reads an ini file of COLMAP. What was given on the command line, in any spelling, goes before;
+  // options of other commands are left out.
+  static void StoreProject(const std::string& path, const po::options_description& all,
+                           const std::set<std::string>& given, po::variables_map* values) {
+    std::ifstream file(path);
+    if (!file) {
+      throw OptionsError("Cannot read the project file " + path + " (--project_path).");
+    }
+    std::set<std::string> given_in_any_group;
+    for (const std::string& name : given) given_in_any_group.insert(WithoutGroup(name));
+    po::parsed_options project = po::parse_config_file(file, all, true);
+    const auto is_left_out = [&](const po::option& option) {
+      return option.unregistered || given.count(option.string_key) > 0 ||
+             (IsOfColmap(option.string_key) &&
+              given_in_any_group.count(WithoutGroup(option.string_key)) > 0);
+    };
+    project.options.erase(
+        std::remove_if(project.options.begin(), project.options.end(), is_left_out),
+        project.options.end());
+    po::store(project, *values);
+  }
+
+  static std::string WithoutGroup(const std::string& name) {
+    return name.substr(name.find('.') + 1);
+  }
+
+  // Whether it is one of kColmapOptions, in any group.
+  static bool IsOfColmap(const std::string& name) {
+    return std::any_of(kGroups.begin(), kGroups.end(),
+                       [&](const std::string& group) { return name.rfind(group + ".", 0) == 0; });
+  }
+
+  // The first option whose name takes the fewest insertions, deletions and replacements of a letter
+  // (Levenshtein). The group does not count: COLMAP's options moved between them.
+  static std::string NearestOption(const std::string& unknown, const po::options_description& all) {
+    const std::string name =
+        WithoutGroup(unknown.substr(std::min(unknown.find_first_not_of('-'), unknown.size())));
+    std::string nearest;
+    std::size_t least = std::numeric_limits<std::size_t>::max();
+    for (const auto& option : all.options()) {
+      const std::size_t distance = EditDistance(name, WithoutGroup(option->long_name()));
+      if (distance >= least) continue;
+      least = distance;
+      nearest = option->long_name();
+    }
+    return nearest;
+  }
+
+  static std::size_t EditDistance(const std::string& a, const std::string& b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), std::size_t{0});
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+      std::size_t diagonal = std::exchange(row[0], i);
+      for (std::size_t j = 1; j <= b.size(); ++j) {
+        const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U);
+        diagonal = row[j];
+        row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+      }
+    }
+    return row[b.size()];
+  }
+
   void ReadColmapOption(const ColmapOption& option, const po::variables_map& values) {
     std::string given;
     std::string text;

@@ -17,6 +17,8 @@ expect_exit 0 '--GraphMatching.max_tests_for_sampling' "$matcher" -h
 expect_exit 0 'graphmatch_matcher 0.' "$matcher" --version
 expect_exit 1 '--database_path is missing' "$matcher"
 expect_exit 1 "unrecognised option '--no_such_option'" "${run[@]}" --no_such_option 1
+expect_exit 1 'Did you mean --SiftMatching.max_ratio?' "${run[@]}" --SiftMatching.maxratio 0.8
+expect_exit 1 'Did you mean --TwoViewGeometry.min_num_inliers?' "${run[@]}" --Mapper.min_num_inlier 20
 expect_exit 1 'must be at least 1' "${run[@]}" --GraphMatching.max_num_neighbors 0
 expect_exit 1 'must be one of carry, floor, round' "${run[@]}" --GraphMatching.sampling_schedule x
 expect_exit 1 'must be a number' "${run[@]}" --SiftMatching.max_ratio zero
@@ -28,6 +30,31 @@ expect_exit 1 'max_ratio must be greater than 0' "${run[@]}" --SiftMatching.max_
 expect_exit 1 'contradict each other' "${run[@]}" --GraphMatching.strategy exhaustive \
   --GraphMatching.match_list_path "$work/pairs.txt"
 expect_exit 1 'must be at least 1, or -1' "${run[@]}" --SiftMatching.num_threads 0
+
+echo "== A project file"
+cat >"$work/project.ini" <<END
+log_to_stderr=false
+random_seed=0
+database_path=$database
+[SiftMatching]
+max_ratio=0.8
+max_error=4
+num_threads=0
+[TwoViewGeometry]
+min_num_inliers=15
+[VocabTreeMatching]
+num_images=100
+vocab_tree_path=
+[Mapper]
+min_num_matches=15
+END
+expect_exit 1 'must be at least 1, or -1' "$matcher" --project_path "$work/project.ini"
+# The command line goes before it, in any spelling.
+expect_exit 1 'max_distance must be greater than 0' "$matcher" --project_path "$work/project.ini" \
+  --FeatureMatching.num_threads 2 --TwoViewGeometry.max_error 3 --SiftMatching.max_distance 0
+expect_exit 2 'There is no database at' "$matcher" --project_path "$work/project.ini" \
+  --database_path "$work/none.db" --SiftMatching.num_threads 2
+expect_exit 1 'Cannot read the project file' "${run[@]}" --project_path "$work/none.ini"
 
 echo "== Wrong databases, programs and directories"
 expect_exit 2 'There is no database at' "$matcher" --database_path "$work/none.db"

@@ -1,6 +1,6 @@
 // check_matching DATABASE NUM_PAIRS: the exact matcher with every instruction set of this processor
-// against the plain reference, on the descriptors of pairs of images of a database. Prints the first
-// difference and exits with 1 if there is one.
+// against the plain reference, on the descriptors of pairs of images of a database. Prints the
+// first difference and exits with 1 if there is one.
 
 #include <cstdlib>
 #include <iostream>
