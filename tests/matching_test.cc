@@ -48,6 +48,7 @@ class MatchingTest : public ::testing::TestWithParam<MatchingTarget> {
 std::string NameOfTarget(const ::testing::TestParamInfo<MatchingTarget>& info) {
   std::string name = info.param.Name();
   std::replace(name.begin(), name.end(), ' ', '_');
+  std::replace(name.begin(), name.end(), '-', '_');
   return name;
 }
 

@@ -15,7 +15,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 class PairListTest : public ::testing::Test {
  protected:
@@ -65,7 +64,12 @@ TEST_F(PairListTest, LinesThatNameNoPairAreCounted) {
   EXPECT_THAT(list.pairs, ElementsAre(ImagePair(1, 2)));
   EXPECT_EQ(list.num_skipped, 3U);
   EXPECT_EQ(list.first_skipped, "a.jpg c.jpg");
-  EXPECT_THAT(Read("").pairs, IsEmpty());
+  EXPECT_THROW(Read(""), FileError);
+  EXPECT_THROW(Read("# nothing\n\n"), FileError);
+  EXPECT_THAT(Read("\xEF\xBB\xBF"
+                   "a.jpg b.jpg")
+                  .pairs,
+              ElementsAre(ImagePair(1, 2)));
   EXPECT_THROW(Read("a.jpg c.jpg"), FileError);
   images_[1].num_features = 0;
   EXPECT_THROW(Read("a.jpg b.jpg"), FileError);
@@ -73,6 +77,7 @@ TEST_F(PairListTest, LinesThatNameNoPairAreCounted) {
 
 TEST_F(PairListTest, AFileThatIsNotThere) {
   EXPECT_THROW(ReadPairList("/nowhere/pairs.txt", images_), FileError);
+  EXPECT_THROW(ReadPairList(directory_.Path(), images_), FileError);
 }
 
 TEST(PipelineOptions, AListAndAnotherStrategyContradictEachOther) {

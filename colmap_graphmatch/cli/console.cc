@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace colmap_graphmatch {
 namespace {
@@ -23,9 +24,11 @@ double Share(std::size_t part, double whole) {
 }
 
 std::string FormatStage(const char* name, const StageStatistics& stage) {
-  std::string line = fmt::format("  {:<12} {:>9} tested {:>9} edges   efficiency {:.3f} {:>12}",
-                                 name, stage.num_tested, stage.num_edges, stage.Efficiency(),
-                                 FormatDuration(stage.seconds));
+  const std::string efficiency =
+      stage.num_tested > 0 ? fmt::format("{:.3f}", stage.Efficiency()) : "-";
+  std::string line =
+      fmt::format("  {:<12} {:>9} tested {:>9} edges   efficiency {:<5} {:>12}", name,
+                  stage.num_tested, stage.num_edges, efficiency, FormatDuration(stage.seconds));
   if (stage.num_known > 0) {
     line +=
         fmt::format("   ({} more were known, {} edges)", stage.num_known, stage.num_known_edges);
@@ -35,19 +38,25 @@ std::string FormatStage(const char* name, const StageStatistics& stage) {
 
 // Where the time of matching went.
 std::string FormatVerification(const VerifierStatistics& statistics) {
-  const double both = statistics.matching_seconds + statistics.colmap_seconds;
-  if (statistics.num_matched == 0) return "";
-  const auto num_matched = static_cast<double>(statistics.num_matched);
-  std::string text =
-      fmt::format("Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
-                  statistics.num_matched, FormatDuration(statistics.matching_seconds),
-                  static_cast<double>(statistics.num_image_reads) / num_matched);
+  std::string text;
+  if (statistics.num_matched > 0) {
+    text +=
+        fmt::format("Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
+                    statistics.num_matched, FormatDuration(statistics.matching_seconds),
+                    static_cast<double>(statistics.num_image_reads) /
+                        static_cast<double>(statistics.num_matched));
+  }
   if (statistics.num_preempted > 0) {
     text += fmt::format("Given up early     {} pairs\n", statistics.num_preempted);
   }
-  text += fmt::format("COLMAP             {} pairs in {}, {:.0f} % of matching and verification\n",
-                      statistics.num_verified, FormatDuration(statistics.colmap_seconds),
-                      both > 0 ? 100 * statistics.colmap_seconds / both : 0);
+  const double both = statistics.matching_seconds + statistics.colmap_seconds;
+  if (both > 0) {
+    text += fmt::format(
+        "COLMAP             {} pairs in {}, summed over its processes: {:.0f} % of {}\n",
+        statistics.num_verified, FormatDuration(statistics.colmap_seconds),
+        100 * statistics.colmap_seconds / both,
+        statistics.num_matched > 0 ? "both" : "matching and verification");
+  }
   return text;
 }
 
@@ -111,18 +120,20 @@ std::string FormatProgress(const LoopProgress& progress, double seconds_of_match
   const std::string stage = progress.stage == LoopStage::kListed     ? "matching"
                             : progress.stage == LoopStage::kSampling ? "sampling"
                                                                      : "propagation";
-  std::string line = fmt::format(
-      "{}: {} tested, {} edges (efficiency {:.2f}), {} components, largest {}, {} alone",
-      progress.stage == LoopStage::kListed ? stage
-                                           : fmt::format("{} {}", stage, progress.iteration + 1),
-      all.num_tested, progress.num_edges, all.Efficiency(), progress.num_components,
-      progress.largest_component, progress.num_isolated);
+  std::string line = progress.stage == LoopStage::kListed
+                         ? stage
+                         : fmt::format("{} {}", stage, progress.iteration + 1);
+  line += fmt::format(": {} tested", all.num_tested);
   if (all.num_tested > 0 && seconds_of_matching > 1) {
     const double rate = static_cast<double>(all.num_tested) / seconds_of_matching;
-    line +=
-        fmt::format(", {:.1f} pairs/s, about {} left", rate,
-                    FormatDuration(static_cast<double>(progress.expected_remaining_tests) / rate));
+    line += fmt::format(
+        ", {:.1f}/s, about {} left", rate,
+        FormatDuration(std::ceil(static_cast<double>(progress.expected_remaining_tests) / rate)));
   }
+  // The most important first: a terminal cuts off what it has no room for.
+  line += fmt::format("; {} edges in all, components {}, largest {}, without an edge {}",
+                      progress.num_edges, progress.num_components, progress.largest_component,
+                      progress.num_isolated);
   return line;
 }
 
@@ -141,19 +152,17 @@ std::string FormatSummary(const PipelineResult& result) {
   text += fmt::format("\nPairs tested       {} of {:.0f} possible ({:.2f} %)\n", all.num_tested,
                       num_possible, Share(all.num_tested, num_possible));
   if (matching.num_seed_pairs > 0) {
-    text +=
-        fmt::format(listed ? "Known before       {} pairs, {} edges\n"
-                           : "Known before       {} pairs of other matchers or options, {} edges\n",
-                    matching.num_seed_pairs, matching.num_seed_edges);
-  }
-  if (all.num_tested + all.num_failed == 0 && all.num_known > 0) {
-    text += "                   Nothing is left to test with these options.\n";
+    text += fmt::format("Already there      {} pairs{}, {} edges\n", matching.num_seed_pairs,
+                        listed ? " that are not listed" : "", matching.num_seed_edges);
   }
   if (!listed) {
     text += FormatStage("sampling", matching.sampling);
     text += FormatStage("propagation", matching.propagation);
   }
   text += FormatStage(listed ? "all" : "both", all);
+  if (all.num_tested + all.num_failed == 0 && matching.finished) {
+    text += "  Nothing is left to test with these options.\n";
+  }
   text +=
       fmt::format("Matching graph     {} edges, {} components, the largest of {} images\n",
                   matching.graph.NumEdges(), matching.num_components, matching.largest_component);
@@ -164,11 +173,14 @@ std::string FormatSummary(const PipelineResult& result) {
                         matching.failed_pairs.size());
   }
   text += FormatVerification(result.verification);
-  text += fmt::format(
-      "Time               {} (mixture {}, Fisher vectors {}, ranking {}, matching {})\n",
-      FormatDuration(result.total_seconds), FormatDuration(result.mixture_seconds),
-      FormatDuration(result.vectors_seconds), FormatDuration(result.ranking_seconds),
-      FormatDuration(result.matching_seconds));
+  text += fmt::format("Time               {}", FormatDuration(result.total_seconds));
+  if (!listed) {
+    text += fmt::format(
+        " (mixture {}, Fisher vectors {}, ranking {}, matching {})",
+        FormatDuration(result.mixture_seconds), FormatDuration(result.vectors_seconds),
+        FormatDuration(result.ranking_seconds), FormatDuration(result.matching_seconds));
+  }
+  text += '\n';
   return text;
 }
 

@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -17,7 +19,15 @@ namespace {
 
 StopRequest stop_request;
 
-void HandleSignal(int /*signal*/) { stop_request.Raise(); }
+void HandleSignal(int /*signal*/) {
+  const bool first = !stop_request.Requested();
+  stop_request.Raise();
+  if (!first) return;
+  static constexpr char kMessage[] =
+      "\nStopping after the shards under way; once more gives them up.\n";
+  const auto ignored = ::write(STDERR_FILENO, kMessage, sizeof(kMessage) - 1);
+  static_cast<void>(ignored);
+}
 
 void InstallSignalHandlers() {
   struct sigaction action = {};

@@ -265,7 +265,15 @@ class Options {
       line_.help = values.count("help") > 0;
       line_.version = values.count("version") > 0;
       if (line_.help || line_.version) return line_;
-      for (const po::option& option : parsed.options) given.insert(option.string_key);
+      for (const po::option& option : parsed.options) {
+        given.insert(option.string_key);
+        // Boost takes what does not begin with a dash for something to be ignored.
+        if (option.position_key >= 0) {
+          throw OptionsError("\"" + option.original_tokens.front() +
+                             "\" on the command line belongs to no option; options begin with --. "
+                             "`graphmatch_matcher -h` lists them.");
+        }
+      }
       if (values.count("project_path") > 0) {
         StoreProject(values["project_path"].as<std::string>(), all, given, &values);
       }

@@ -400,6 +400,13 @@ void ComputeTopTwoOnTarget(const DescriptorView& a, const DescriptorView& b, boo
 
 // The target, and whether it is one that dot products of bytes add to.
 const char* TargetName(bool dot_products) {
+#if HWY_TARGET <= HWY_AVX3_DL
+  static_cast<void>(dot_products);
+  return "AVX-512 with VNNI";
+#elif HWY_TARGET == HWY_AVX3
+  static_cast<void>(dot_products);
+  return "AVX-512";
+#else
 #if HWY_TARGET == HWY_AVX2
   if (dot_products) return "AVX2 with VNNI";
 #elif GRAPHMATCH_NEON_DOT
@@ -407,6 +414,7 @@ const char* TargetName(bool dot_products) {
 #endif
   static_cast<void>(dot_products);
   return hwy::TargetName(HWY_TARGET);
+#endif
 }
 
 }  // namespace HWY_NAMESPACE

@@ -73,9 +73,11 @@ std::vector<ImagePair> ReadListedPairs(const std::filesystem::path& path,
                                        PipelineObserver& observer) {
   PairList list = ReadPairList(path, images);
   if (list.num_skipped > 0) {
-    observer.OnWarning(std::to_string(list.num_skipped) + " lines of " + path.string() +
-                       " do not name two images of the database and are skipped; the first is \"" +
-                       list.first_skipped + "\".");
+    observer.OnWarning(
+        std::to_string(list.num_skipped) + " line(s) of " + path.string() +
+        " that do not name two images of the database with features are skipped; the "
+        "first is \"" +
+        list.first_skipped + "\".");
   }
   return std::move(list.pairs);
 }
@@ -114,6 +116,10 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
                        " images have no features and cannot be matched.");
   }
 
+  const bool from_list = !options.match_list_path.empty();
+  std::vector<ImagePair> listed_pairs;
+  if (from_list) listed_pairs = ReadListedPairs(options.match_list_path, all_images, observer);
+
   // COLMAP is looked at first: that it is missing should not be learnt after the features were
   // read.
   const WorkDirectory work(options.work_path);
@@ -130,14 +136,11 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
                   ", processes: " + std::to_string(verifier.NumProcesses()) +
                   ", threads in each: " + std::to_string(verifier.NumThreadsPerProcess()) + ".");
 
-  result.listed = !options.match_list_path.empty() ||
-                  options.strategy == PipelineOptions::Strategy::kExhaustive;
+  result.listed = from_list || options.strategy == PipelineOptions::Strategy::kExhaustive;
   const auto on_progress = [&](const LoopProgress& progress) { observer.OnProgress(progress); };
-  if (!options.match_list_path.empty()) {
-    const std::vector<ImagePair> pairs =
-        ReadListedPairs(options.match_list_path, all_images, observer);
+  if (from_list) {
     result.matching = Timed(&result.matching_seconds, [&] {
-      return VerifyListedPairs(pairs, Ids(images), verifier, on_progress);
+      return VerifyListedPairs(listed_pairs, Ids(images), verifier, on_progress);
     });
   } else if (options.strategy == PipelineOptions::Strategy::kExhaustive) {
     result.matching = Timed(&result.matching_seconds,

@@ -14,14 +14,16 @@ PairList ReadPairList(const std::filesystem::path& path, const std::vector<Image
   }
 
   std::ifstream file(path);
-  if (!file) {
+  if (!file || std::filesystem::is_directory(path)) {
     throw FileError("Cannot read the list of image pairs " + path.string() +
-                    ". Does the file exist?");
+                    ": there is no such file.");
   }
   PairList list;
   std::size_t line_number = 0;
   for (std::string line; std::getline(file, line);) {
     ++line_number;
+    if (line_number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0)
+      line.erase(0, 3);  // A byte order mark.
     const std::size_t begin = line.find_first_not_of(" \t\r");
     if (begin == std::string::npos || line[begin] == '#') continue;
     line = line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin);
@@ -57,7 +59,10 @@ PairList ReadPairList(const std::filesystem::path& path, const std::vector<Image
     list.pairs.push_back(pair);
   }
   if (file.bad()) throw FileError("Cannot read " + path.string() + " to its end.");
-  if (list.pairs.empty() && list.num_skipped > 0) {
+  if (list.pairs.empty() && list.num_skipped == 0) {
+    throw FileError("The list of image pairs " + path.string() + " is empty.");
+  }
+  if (list.pairs.empty()) {
     throw FileError("No line of " + path.string() +
                     " names two images with features of this database; the first is \"" +
                     list.first_skipped + "\". Are these names as in the table `images`?");

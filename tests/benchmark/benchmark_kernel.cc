@@ -79,9 +79,9 @@ double Int8Peak(std::int64_t num) {
 std::vector<Peak> Peaks() {
   return {{"float FMA, 256 bits", "AVX2", FloatPeak},
           {"int16 multiply-add and add, 256 bits", "AVX2", Int16Peak},
-          {"int16 multiply-add and add, 512 bits", "AVX3", WideInt16Peak},
+          {"int16 multiply-add and add, 512 bits", "AVX-512", WideInt16Peak},
           {"int8 dot product (VNNI), 256 bits", "AVX2 with VNNI", VexInt8Peak},
-          {"int8 dot product (VNNI), 512 bits", "AVX3_DL", Int8Peak}};
+          {"int8 dot product (VNNI), 512 bits", "AVX-512 with VNNI", Int8Peak}};
 }
 #else
 std::vector<Peak> Peaks() { return {}; }

@@ -146,6 +146,8 @@ expect_exit 0 'Pairs tested       0 of 780' "$matcher" --database_path "$work/ex
   --colmap_path "$fake" --GraphMatching.strategy exhaustive
 grep -q 'Nothing is left to test' "$work/output.txt" || fail "no word that nothing is left"
 expect_exit 1 'is empty' "${run[@]}" --GraphMatching.match_list_path ''
+expect_exit 1 '"exhaustive" on the command line belongs to no option' \
+  "${run[@]}" --GraphMatching.strategy graphmatch exhaustive
 cp "$work/untouched.db" "$work/listed.db"
 cat >"$work/pairs.txt" <<END
 # two names a line
@@ -157,7 +159,7 @@ expect_exit 5 'Cannot read the list' "$matcher" --database_path "$work/listed.db
   --colmap_path "$fake" --GraphMatching.match_list_path "$work/none.txt"
 expect_exit 0 'Pairs tested       2 of 780' "$matcher" --database_path "$work/listed.db" \
   --colmap_path "$fake" --GraphMatching.match_list_path "$work/pairs.txt"
-grep -q '1 lines of .* skipped; the first is "place1/photo 3.jpg no/photo.jpg"' "$work/output.txt" ||
+grep -q '1 line(s) of .* skipped; the first is "place1/photo 3.jpg no/photo.jpg"' "$work/output.txt" ||
   fail "a line that names no pair was not mentioned"
 
 echo "== One pair that COLMAP crashes on"
