@@ -41,7 +41,7 @@ for colmap in "${colmaps[@]}"; do
   for ((run = 0; run < runs; ++run)); do
     clean_copy exact
     all=$(cpu "$matcher" --database_path "$work/exact.db" --GraphMatching.match_list_path "$pairs" \
-      --GraphMatching.matcher exact)
+      --GraphMatching.matcher exact --colmap_path "$colmap")
     clean_copy colmap
     colmap_all=$(cpu "${import[@]}" --database_path "$work/colmap.db")
     sqlite3 "$work/exact.db" 'DELETE FROM two_view_geometries'
