@@ -92,9 +92,12 @@ void DescriptorCache::Read(const std::function<Reader()>& make_reader) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++num_reads_;
     entry->features = std::move(features);
-    entry->exception = exception;
+    entry->exception = std::move(exception);
     entry->ready = true;
     Keep(entry);
+    // Whoever waits is the last to hold it: an exception is not to end on this thread while it is
+    // being read on another.
+    entry.reset();
     read_.notify_all();
   }
 }
