@@ -228,9 +228,9 @@ class Options {
     work.add_options()("GraphMatching.num_processes", Field(&p.verification.num_processes),
                        "COLMAP processes at a time; 0: one a core without a GPU, else one")(
         "GraphMatching.max_pairs_per_shard", Field(&p.verification.max_pairs_per_shard),
-        "pairs (>= 1) that COLMAP gets at a time; kill -9 loses at most this much work a process")(
-        "GraphMatching.timeout_per_pair", Field(&p.verification.timeout_per_pair),
-        "seconds (> 0) a pair after which COLMAP counts as hanging")(
+        "pairs (>= 1) that COLMAP gets at a time; kill -9 loses at most so many verified pairs a "
+        "process")("GraphMatching.timeout_per_pair", Field(&p.verification.timeout_per_pair),
+                   "seconds (> 0) a pair after which COLMAP counts as hanging")(
         "GraphMatching.lock_timeout", Field(&p.verification.lock_timeout),
         "seconds (>= 0) to wait while another program locks the database")(
         "GraphMatching.work_path", po::value<std::string>(),

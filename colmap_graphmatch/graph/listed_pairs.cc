@@ -1,6 +1,8 @@
 #include "colmap_graphmatch/graph/listed_pairs.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <optional>
 
 #include "colmap_graphmatch/graph/graph_builder.h"
 

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <cstddef>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "colmap_graphmatch/base/pair_verifier.h"
@@ -16,7 +14,7 @@ namespace colmap_graphmatch {
 // asked for like all others, in the same batches, so that a run that goes on after an interruption
 // ends like one that was not interrupted; those that were not asked for are added to the graph in
 // the end. image_ids: ascending; pairs of other images, pairs of an image with itself and repeated
-// pairs are left out. Every tested pair takes some 16 bytes. Exceptions of the verifier pass
+// pairs are left out. Memory grows with the number of tested pairs. Exceptions of the verifier pass
 // through.
 GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                                 const std::function<void(const LoopProgress&)>& on_progress);
