@@ -23,7 +23,9 @@ namespace colmap_graphmatch {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::ElementsAreArray;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 constexpr std::size_t kDim = 16;
@@ -591,6 +593,139 @@ TEST(Loop, NewImagesAreSampledAndOldOnesHardly) {
   EXPECT_LT(second.tested.size(), whole.tested.size() / 4);
   EXPECT_GT(result.graph.Degree(30), 0U);
   EXPECT_GT(result.graph.Degree(35), 0U);
+}
+
+// The scene without some of its vertices.
+Scene Without(const Scene& scene, const std::set<Vertex>& removed) {
+  Scene rest;
+  std::vector<Vertex> numbers(scene.num_vertices);
+  for (Vertex vertex = 0; vertex < scene.num_vertices; ++vertex) {
+    if (removed.count(vertex) > 0) continue;
+    numbers[vertex] = static_cast<Vertex>(rest.num_vertices++);
+    const auto row = scene.vectors.begin() + static_cast<std::ptrdiff_t>(vertex * kDim);
+    rest.vectors.insert(rest.vectors.end(), row, row + kDim);
+  }
+  for (const auto& [a, b] : scene.edges) {
+    if (removed.count(a) + removed.count(b) == 0) rest.edges.emplace(numbers[a], numbers[b]);
+  }
+  return rest;
+}
+
+TEST(Loop, ImagesThatWereSampledLeaveSamplingToNewOnes) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 23);
+  const std::set<Vertex> added = {30, 35, 36};
+  std::vector<ImageId> old_ids;
+  std::set<ImageId> new_ids;
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  for (Vertex vertex = 0; vertex < ids.size(); ++vertex) {
+    if (added.count(vertex) > 0) {
+      new_ids.insert(ids[vertex]);
+    } else {
+      old_ids.push_back(ids[vertex]);
+    }
+  }
+  ThreadPool threads(2);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  for (const int max_tests : {0, 15}) {
+    GraphMatchOptions options;
+    options.max_tests_for_sampling = max_tests;
+    RecordingVerifier first(edges);
+    RunGraphMatch(options, MakeRanking(Without(scene, added)), old_ids, first, threads, nullptr);
+    RecordingVerifier second(edges);
+    second.known.insert(first.tested.begin(), first.tested.end());
+    const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &second);
+    ASSERT_THAT(second.batches, Not(IsEmpty()));
+    for (const ImagePair& pair : second.batches.front()) {
+      EXPECT_GT(new_ids.count(pair.id1) + new_ids.count(pair.id2), 0U);
+    }
+    for (const Vertex vertex : added) EXPECT_GT(result.graph.Degree(vertex), 0U);
+    EXPECT_LT(second.tested.size(), first.tested.size() / 4);
+  }
+}
+
+TEST(Loop, InterruptedAfterOtherMatchersItEndsAsIfItHadNotBeen) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 22);
+  const Ranking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  std::set<ImagePair> others;
+  for (std::size_t i = 0; i + 5 < ids.size(); ++i) others.emplace(ids[i], ids[i + 5]);
+  ThreadPool threads(2);
+  const GraphMatchOptions options;
+  RecordingVerifier whole(edges);
+  whole.known = others;
+  RunLoop(options, ranking, &whole);
+  std::set<ImagePair> expected(whole.tested.begin(), whole.tested.end());
+  expected.insert(others.begin(), others.end());
+  for (std::size_t stop_after = 0; stop_after < whole.tested.size(); stop_after += 23) {
+    // Twice interrupted; what is kept between the runs is the seeds.
+    std::set<ImagePair> known = others;
+    std::vector<ImagePair> seeds;
+    for (const std::size_t num : {stop_after, std::size_t{17}, whole.tested.size()}) {
+      RecordingVerifier verifier(edges);
+      verifier.known = known;
+      verifier.stop_after = num;
+      seeds = ChooseSeeds(options, ranking, ids, verifier, threads, seeds);
+      EXPECT_THAT(seeds, ElementsAreArray(others));
+      RunGraphMatch(options, ranking, ids, verifier, threads, nullptr, seeds);
+      known.insert(verifier.tested.begin(), verifier.tested.end());
+    }
+    EXPECT_EQ(known, expected) << "after " << stop_after;
+  }
+}
+
+TEST(Loop, OnlyImagesThatSeekLookForPartners) {
+  const Scene scene = MakeScene(6, 14, 4, 0.7, 24);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  GraphMatchOptions options;
+  options.restrictions.seeking.resize(scene.num_vertices);
+  const std::set<Vertex> seeking = {3, 40, 41};
+  std::set<ImageId> seeking_ids;
+  for (const Vertex vertex : seeking) {
+    options.restrictions.seeking[vertex] = true;
+    seeking_ids.insert(ids[vertex]);
+  }
+  // The others have been matched: what they found leads on.
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  for (const ImagePair& pair : ImageEdges(scene, ids)) {
+    if (seeking_ids.count(pair.id1) + seeking_ids.count(pair.id2) == 0) verifier.known.insert(pair);
+  }
+  const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &verifier);
+  EXPECT_THAT(verifier.tested, Not(IsEmpty()));
+  for (const ImagePair& pair : verifier.tested) {
+    EXPECT_GT(seeking_ids.count(pair.id1) + seeking_ids.count(pair.id2), 0U);
+  }
+  for (const Vertex vertex : seeking) EXPECT_GT(result.graph.Degree(vertex), 3U);
+  EXPECT_GT(result.propagation.num_tested, 0U);
+
+  RecordingVerifier exhaustive(ImageEdges(scene, ids));
+  VerifyAllPairs(ids, exhaustive, nullptr, options.restrictions);
+  EXPECT_EQ(exhaustive.tested.size(), 3 * (ids.size() - 1) - 3);
+}
+
+TEST(Loop, PairsOfOneFrameAreNotTested) {
+  const Scene scene = MakeScene(4, 12, 11, 0.5, 25);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  GraphMatchOptions options;
+  // Frames of three images; some images have none.
+  std::map<ImageId, std::uint32_t> frames;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    options.restrictions.frames.push_back(i % 12 < 6 ? static_cast<std::uint32_t>(1 + i / 3) : 0);
+    frames[ids[i]] = options.restrictions.frames.back();
+  }
+  std::size_t num_within = 0;
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  RunLoop(options, MakeRanking(scene), &verifier);
+  for (const ImagePair& pair : verifier.tested) {
+    num_within += frames[pair.id1] != 0 && frames[pair.id1] == frames[pair.id2] ? 1U : 0U;
+  }
+  EXPECT_EQ(num_within, 0U);
+  // Eight frames of three pairs each are left out, of all pairs; of the edges all others are found.
+  EXPECT_EQ(verifier.tested.empty(), false);
+  RecordingVerifier exhaustive(ImageEdges(scene, ids));
+  const GraphMatchResult all = VerifyAllPairs(ids, exhaustive, nullptr, options.restrictions);
+  EXPECT_EQ(exhaustive.tested.size(), 48U * 47U / 2U - 8U * 3U);
+  EXPECT_EQ(all.graph.NumEdges(), scene.edges.size() - 8U * 3U);
 }
 
 TEST(Loop, PairsThatCannotBeTestedAreReportedOnceAndAreNoEdges) {

@@ -263,7 +263,9 @@ TEST_F(VerifierTest, OptionsAreSpeltAsTheInstalledColmapSpellsThem) {
                                     HasSubstr("--FeatureMatching.use_gpu=0"),
                                     HasSubstr("--FeatureMatching.num_threads=1"),
                                     HasSubstr("--FeatureMatching.min_num_inliers=18"))));
-  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("COLMAP 4.2.1 has no option max_error")));
+  EXPECT_THAT(warnings_,
+              ElementsAre(HasSubstr(
+                  "COLMAP 4.2.1 does not have these options, which have no effect: max_error.")));
 }
 
 TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {

@@ -46,9 +46,7 @@ void InstallSignalHandlers() {
 int Run(const CommandLine& line) {
   InstallSignalHandlers();
   Console console(stderr);
-  for (const std::string& option : line.unused_options) {
-    console.OnInfo("--" + option + " has no effect here.");
-  }
+  for (const std::string& message : line.unused_options) console.OnInfo(message);
   try {
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
     console.ClearProgress();

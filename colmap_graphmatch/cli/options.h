@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -12,7 +13,10 @@ struct CommandLine {
   PipelineOptions pipeline;
   bool help = false;
   bool version = false;
-  // Options of vocab_tree_matcher that were given and have no meaning here.
+  std::filesystem::path project_path;
+  bool lightglue = false;  // The matcher's type is SIFT_LIGHTGLUE.
+  // What is to be said about options of vocab_tree_matcher that were given and have no meaning
+  // here, an entry each.
   std::vector<std::string> unused_options;
 };
 
@@ -20,5 +24,8 @@ struct CommandLine {
 CommandLine ParseCommandLine(int argc, const char* const* argv);
 
 void PrintHelp(std::ostream& stream);
+
+// docs/options.md.
+void PrintOptionsDocument(std::ostream& stream);
 
 }  // namespace colmap_graphmatch

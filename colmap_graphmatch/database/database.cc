@@ -1,6 +1,7 @@
 #include "colmap_graphmatch/database/database.h"
 
 #include <algorithm>
+#include <boost/crc.hpp>
 #include <cmath>
 #include <cstring>
 #include <iterator>
@@ -263,6 +264,37 @@ Keypoints Database::ReadKeypoints(ImageId image_id) {
   keypoints.data.resize(size / sizeof(float));
   if (size > 0) std::memcpy(keypoints.data.data(), select.Data(2), size);
   return keypoints;
+}
+
+std::vector<ImageFingerprint> Database::ReadFingerprints(const std::vector<ImageRecord>& images) {
+  // About what is on the pages of the rows themselves: the rest of a blob is elsewhere in the file.
+  constexpr std::size_t kNumBytes = 2048;
+  sqlite::BlobPrefixReader descriptors(connection_, "descriptors", "data");
+  sqlite::BlobPrefixReader keypoints(connection_, "keypoints", "data");
+  std::vector<ImageFingerprint> fingerprints;
+  for (const ImageRecord& image : images) {
+    if (image.num_features == 0) continue;
+    boost::crc_32_type crc;
+    for (sqlite::BlobPrefixReader* reader : {&descriptors, &keypoints}) {
+      const sqlite::Blob bytes = reader->Read(image.id, kNumBytes);
+      crc.process_bytes(bytes.data(), bytes.size());
+    }
+    fingerprints.push_back({image.id, static_cast<std::int64_t>(crc.checksum()) << 31 ^
+                                          static_cast<std::int64_t>(image.num_features)});
+  }
+  return fingerprints;
+}
+
+std::map<ImageId, std::uint32_t> Database::ReadFrames() {
+  std::map<ImageId, std::uint32_t> frames;
+  if (connection_.Columns("frame_data").empty()) return frames;
+  // SensorType::CAMERA in COLMAP (src/colmap/sensor/rig.h, `sensor_t`) is 0.
+  sqlite::Statement select(connection_,
+                           "SELECT data_id, frame_id FROM frame_data WHERE sensor_type = 0");
+  while (select.Step()) {
+    frames[static_cast<ImageId>(select.Int(0))] = static_cast<std::uint32_t>(select.Int(1));
+  }
+  return frames;
 }
 
 std::vector<TestedPair> Database::ReadTestedPairs() {

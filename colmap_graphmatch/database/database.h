@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -72,6 +73,14 @@ class Database {
   // Throws if there are not as many as when the images were listed.
   Descriptors ReadDescriptors(const ImageRecord& image);
   Keypoints ReadKeypoints(ImageId image_id);
+
+  // What tells whether the features of an image are still the same: their number and the beginnings
+  // of their descriptors and keypoints. Images without features are left out.
+  std::vector<ImageFingerprint> ReadFingerprints(const std::vector<ImageRecord>& images);
+
+  // The frame of every image that has one (COLMAP 3.12 and later): what the cameras of a rig took
+  // at the same time.
+  std::map<ImageId, std::uint32_t> ReadFrames();
 
   // The pairs that have a row in `two_view_geometries`, ascending. (COLMAP's matchers also ask for
   // a row in `matches` before they skip a pair; what is verified is never verified again here.)

@@ -35,4 +35,10 @@ struct Keypoints {
   std::vector<float> Scales(std::size_t num) const;
 };
 
+// An image and what tells whether its features are still the same.
+struct ImageFingerprint {
+  ImageId id = 0;
+  std::int64_t features = 0;
+};
+
 }  // namespace colmap_graphmatch

@@ -40,14 +40,16 @@ Connection::Connection(const std::filesystem::path& path, Access access,
       lockable_path_(path),
       lock_timeout_seconds_(lock_timeout_seconds),
       db_(nullptr, &sqlite3_close) {
-  const int mode = access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE;
+  const int mode = access == Access::kRead        ? SQLITE_OPEN_READONLY
+                   : access == Access::kReadWrite ? SQLITE_OPEN_READWRITE
+                                                  : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
   sqlite3* db = nullptr;
   const int result =
       sqlite3_open_v2(path.c_str(), &db, mode | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
   db_.reset(db);
   if (result != SQLITE_OK) Throw("open the database");
   // SQLite falls back to reading a file that it may not write, without a word.
-  if (access == Access::kReadWrite && sqlite3_db_readonly(db, "main") == 1) {
+  if (access != Access::kRead && sqlite3_db_readonly(db, "main") == 1) {
     throw DatabaseError(
         path.string() +
         " is read-only. Give yourself the right to write to it, or copy it to a place that "
@@ -91,12 +93,12 @@ void Connection::Throw(const std::string& doing) const {
                                 "). Close that program, or wait longer with "
                                 "--GraphMatching.lock_timeout.");
     case SQLITE_NOTADB:
-      throw DatabaseError(path_.string() +
-                          " is not a SQLite database. Give the database.db that "
-                          "`colmap feature_extractor` wrote.");
+      throw DamagedFileError(path_.string() +
+                             " is not a SQLite database. Give the database.db that "
+                             "`colmap feature_extractor` wrote.");
     case SQLITE_CORRUPT:
-      throw DatabaseError(what + detail +
-                          ". The file is damaged: `sqlite3 FILE .recover` may save its contents.");
+      throw DamagedFileError(
+          what + detail + ". The file is damaged: `sqlite3 FILE .recover` may save its contents.");
     case SQLITE_FULL:
       throw DatabaseError(what +
                           "the disk is full. Nothing half-written was kept; free some space "
@@ -195,8 +197,27 @@ Blob Statement::CopyBlob(int column) const {
   return data == nullptr ? Blob() : Blob(data, data + Size(column));
 }
 
-Transaction::Transaction(Connection& connection) : connection_(&connection) {
-  connection.Execute("BEGIN IMMEDIATE");
+BlobPrefixReader::BlobPrefixReader(Connection& connection, const std::string& table,
+                                   const std::string& column)
+    : connection_(&connection), table_(table), column_(column) {}
+
+BlobPrefixReader::~BlobPrefixReader() { sqlite3_blob_close(blob_); }
+
+Blob BlobPrefixReader::Read(std::int64_t row, std::size_t num_bytes) {
+  const int result = blob_ == nullptr
+                         ? sqlite3_blob_open(connection_->db_.get(), "main", table_.c_str(),
+                                             column_.c_str(), row, 0, &blob_)
+                         : sqlite3_blob_reopen(blob_, row);
+  if (result != SQLITE_OK) connection_->Throw("read a blob of the table " + table_);
+  Blob blob(std::min(num_bytes, static_cast<std::size_t>(sqlite3_blob_bytes(blob_))));
+  if (sqlite3_blob_read(blob_, blob.data(), static_cast<int>(blob.size()), 0) != SQLITE_OK) {
+    connection_->Throw("read a blob of the table " + table_);
+  }
+  return blob;
+}
+
+Transaction::Transaction(Connection& connection, Kind kind) : connection_(&connection) {
+  connection.Execute(kind == Kind::kExclusive ? "BEGIN EXCLUSIVE" : "BEGIN IMMEDIATE");
 }
 
 Transaction::~Transaction() {

@@ -8,7 +8,10 @@
 #include <string_view>
 #include <vector>
 
+#include "colmap_graphmatch/base/errors.h"
+
 struct sqlite3;
+struct sqlite3_blob;
 struct sqlite3_stmt;
 
 // The little of SQLite that COLMAP databases need, with errors as exceptions: DatabaseLockedError
@@ -18,11 +21,18 @@ namespace colmap_graphmatch::sqlite {
 
 using Blob = std::vector<std::uint8_t>;
 
-enum class Access { kRead, kReadWrite };
+// kCreate: like kReadWrite, and a file that is not there is made.
+enum class Access { kRead, kReadWrite, kCreate };
+
+// The file is no SQLite database, or a damaged one.
+class DamagedFileError : public DatabaseError {
+ public:
+  using DatabaseError::DatabaseError;
+};
 
 class Connection {
  public:
-  // Opens an existing file; never creates one. lock_timeout_seconds: how long every later call
+  // Opens a file. lock_timeout_seconds: how long every later call
   // waits for locks of other processes.
   Connection(const std::filesystem::path& path, Access access, double lock_timeout_seconds);
 
@@ -41,6 +51,7 @@ class Connection {
   [[noreturn]] void Throw(const std::string& doing) const;
 
  private:
+  friend class BlobPrefixReader;
   friend class Statement;
 
   std::filesystem::path path_;
@@ -83,11 +94,32 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement_;
 };
 
+// The beginning of the blobs of a column, without reading the rest of them.
+class BlobPrefixReader {
+ public:
+  // The table's rows must be numbered by an INTEGER PRIMARY KEY.
+  BlobPrefixReader(Connection& connection, const std::string& table, const std::string& column);
+  ~BlobPrefixReader();
+  BlobPrefixReader(const BlobPrefixReader&) = delete;
+  BlobPrefixReader& operator=(const BlobPrefixReader&) = delete;
+
+  // At most num_bytes of the blob of a row. Throws if there is no such row, or no blob in it.
+  Blob Read(std::int64_t row, std::size_t num_bytes);
+
+ private:
+  Connection* connection_;
+  std::string table_;
+  std::string column_;
+  sqlite3_blob* blob_ = nullptr;
+};
+
 // Rolls back when it goes out of scope, unless Commit was called.
 class Transaction {
  public:
-  // BEGIN IMMEDIATE: takes the write lock now, so that a competing writer is met here.
-  explicit Transaction(Connection& connection);
+  // kImmediate: takes the write lock now, so that a competing writer is met here. kExclusive:
+  // nobody else may even read.
+  enum class Kind { kImmediate, kExclusive };
+  explicit Transaction(Connection& connection, Kind kind = Kind::kImmediate);
   ~Transaction();
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;

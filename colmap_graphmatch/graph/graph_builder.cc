@@ -1,6 +1,7 @@
 #include "colmap_graphmatch/graph/graph_builder.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -36,8 +37,20 @@ std::vector<TestedVertexPair> GraphBuilder::KnownOutsideGraph() const {
   return pairs;
 }
 
-bool GraphBuilder::AddKnown() {
-  const std::vector<TestedVertexPair> seeds = KnownOutsideGraph();
+bool GraphBuilder::AddKnown() { return AddSeeds(KnownOutsideGraph()); }
+
+bool GraphBuilder::AddKnown(const std::vector<ImagePair>& pairs) {
+  std::vector<TestedVertexPair> seeds = KnownOutsideGraph();
+  const auto is_listed = [&](const TestedVertexPair& known) {
+    return std::binary_search(
+        pairs.begin(), pairs.end(),
+        ImagePair(image_ids_[known.pair.first], image_ids_[known.pair.second]));
+  };
+  seeds.erase(std::remove_if(seeds.begin(), seeds.end(), std::not_fn(is_listed)), seeds.end());
+  return AddSeeds(seeds);
+}
+
+bool GraphBuilder::AddSeeds(const std::vector<TestedVertexPair>& seeds) {
   for (const TestedVertexPair& seed : seeds) {
     if (!seed.is_edge) continue;
     ++result_.num_seed_edges;

@@ -20,8 +20,10 @@ class GraphBuilder {
 
   const MatchingGraph& Graph() const { return graph_; }
 
-  // Adds the known pairs that are not in the graph. Returns true if there were any.
+  // Adds the known pairs that are not in the graph: all, or those of an ascending list. Returns
+  // true if there were any.
   bool AddKnown();
+  bool AddKnown(const std::vector<ImagePair>& pairs);
 
   std::size_t NumKnownOutsideGraph() const { return KnownOutsideGraph().size(); }
 
@@ -38,6 +40,7 @@ class GraphBuilder {
 
  private:
   std::vector<TestedVertexPair> KnownOutsideGraph() const;
+  bool AddSeeds(const std::vector<TestedVertexPair>& seeds);
   StageStatistics& Total(LoopStage stage);
   void Report(LoopStage stage, int iteration, std::size_t num_edges_in_batch,
               double num_remaining_tests);

@@ -21,11 +21,13 @@ class Loop {
         sampler_(options, ranking, threads),
         builder_(image_ids, verifier, on_progress) {}
 
-  // When what is known becomes part of the graph without having been asked for.
-  enum class Seeding { kNever, kAtTheEnd, kAtTheStart };
+  // Makes known pairs part of the graph.
+  void Begin(const std::vector<ImagePair>& seeds) {
+    if (!seeds.empty() && builder_.AddKnown(seeds)) sampler_.ChargeTested(builder_.Graph());
+  }
 
-  GraphMatchResult Run(Seeding seeding) {
-    if (seeding == Seeding::kAtTheStart) Seed();
+  // add_known_at_the_end: what is known and was not asked for may still lead on.
+  GraphMatchResult Run(bool add_known_at_the_end) {
     for (iteration_ = 0; builder_.Continues(); ++iteration_) {
       iterations_.emplace_back();
       const bool sampled = Sample();
@@ -35,8 +37,8 @@ class Loop {
       if (!sampling_over_ && options_.MoreTestsAfterEmpty(iteration_, ranking_.NumVertices())) {
         continue;
       }
-      // What is known and was not asked for may still lead on.
-      if (seeding == Seeding::kNever || !Seed()) break;
+      if (!add_known_at_the_end || !builder_.AddKnown()) break;
+      sampler_.ChargeTested(builder_.Graph());
     }
     GraphMatchResult result = builder_.Finish();
     result.iterations = std::move(iterations_);
@@ -66,13 +68,6 @@ class Loop {
     iterations_.back().propagation =
         builder_.Verify(LoopStage::kPropagation, iteration_, pairs, ExpectedTestsAfterThisBatch());
     return !pairs.empty();
-  }
-
-  // Adds what is known to the graph. Returns true if that changed it.
-  bool Seed() {
-    const bool changed = builder_.AddKnown();
-    sampler_.ChargeTested(builder_.Graph());
-    return changed;
   }
 
   // As many in each iteration to come as in the last whole one. They shrink, so this is rather too
@@ -122,6 +117,14 @@ class KnownOnly : public PairVerifier {
   const std::vector<VerifiedPair>& known_;
 };
 
+void CheckInput(const GraphMatchOptions& options, const Ranking& ranking,
+                const std::vector<ImageId>& image_ids) {
+  options.Check();
+  if (image_ids.size() != ranking.NumVertices()) {
+    throw OptionsError("Every ranked image needs its id.");
+  }
+}
+
 }  // namespace
 
 StageStatistics operator+(const StageStatistics& a, const StageStatistics& b) {
@@ -135,28 +138,45 @@ StageStatistics operator+(const StageStatistics& a, const StageStatistics& b) {
   return sum;
 }
 
+std::vector<ImagePair> ChooseSeeds(const GraphMatchOptions& options, const Ranking& ranking,
+                                   const std::vector<ImageId>& image_ids,
+                                   const PairVerifier& verifier, ThreadPool& threads,
+                                   const std::vector<ImagePair>& earlier_seeds) {
+  CheckInput(options, ranking, image_ids);
+  if (verifier.KnownPairs().empty()) return {};
+  const auto asks_for_all_known = [&](const std::vector<ImagePair>& seeds) {
+    const std::function<void(const LoopProgress&)> silent;
+    KnownOnly known_only(verifier);
+    Loop rehearsal(options, ranking, image_ids, known_only, threads, silent);
+    rehearsal.Begin(seeds);
+    const std::size_t num_known = rehearsal.NumKnownOutsideGraph();
+    const GraphMatchResult rehearsed = rehearsal.Run(false);
+    return (rehearsed.sampling + rehearsed.propagation).num_known == num_known;
+  };
+  if (!earlier_seeds.empty() && asks_for_all_known(earlier_seeds)) return earlier_seeds;
+  if (asks_for_all_known({})) return {};
+  std::vector<ImagePair> all;
+  for (const VerifiedPair& known : verifier.KnownPairs()) all.push_back(known.pair);
+  return all;
+}
+
+GraphMatchResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
+                               const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                               ThreadPool& threads,
+                               const std::function<void(const LoopProgress&)>& on_progress,
+                               const std::vector<ImagePair>& seeds) {
+  CheckInput(options, ranking, image_ids);
+  Loop loop(options, ranking, image_ids, verifier, threads, on_progress);
+  loop.Begin(seeds);
+  return loop.Run(true);
+}
+
 GraphMatchResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
                                const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                                ThreadPool& threads,
                                const std::function<void(const LoopProgress&)>& on_progress) {
-  options.Check();
-  if (image_ids.size() != ranking.NumVertices()) {
-    throw OptionsError("Every ranked image needs its id.");
-  }
-  // Would a run from the start ask for all that is known? Then an earlier run of this loop tested
-  // it, and this one goes the same way again, up to where that one ended. Otherwise others did, and
-  // it seeds the graph.
-  Loop::Seeding seeding = Loop::Seeding::kAtTheEnd;
-  if (!verifier.KnownPairs().empty()) {
-    const std::function<void(const LoopProgress&)> silent;
-    KnownOnly known_only(verifier);
-    Loop rehearsal(options, ranking, image_ids, known_only, threads, silent);
-    const std::size_t num_known = rehearsal.NumKnownOutsideGraph();
-    const GraphMatchResult rehearsed = rehearsal.Run(Loop::Seeding::kNever);
-    const StageStatistics asked = rehearsed.sampling + rehearsed.propagation;
-    if (asked.num_known < num_known) seeding = Loop::Seeding::kAtTheStart;
-  }
-  return Loop(options, ranking, image_ids, verifier, threads, on_progress).Run(seeding);
+  return RunGraphMatch(options, ranking, image_ids, verifier, threads, on_progress,
+                       ChooseSeeds(options, ranking, image_ids, verifier, threads, {}));
 }
 
 }  // namespace colmap_graphmatch

@@ -69,16 +69,31 @@ struct GraphMatchResult {
   StageStatistics All() const { return sampling + propagation + listed; }
 };
 
+// Finds out which known pairs have to be part of the graph from the start, so that what earlier
+// runs did is gone on with (docs/design.md); ascending. Known pairs that are no seeds are answered
+// from what is known in the places where an undisturbed run would have tested them; so a run that
+// goes on after an interruption follows the path of the first and tests what is missing. If the
+// loop, started from the earlier seeds (those of the run that may have been interrupted; ascending)
+// or from none, asks for everything that is known, these are the seeds. Otherwise another matcher
+// tested pairs, or images were added, and all known pairs are.
+std::vector<ImagePair> ChooseSeeds(const GraphMatchOptions& options, const Ranking& ranking,
+                                   const std::vector<ImageId>& image_ids,
+                                   const PairVerifier& verifier, ThreadPool& threads,
+                                   const std::vector<ImagePair>& earlier_seeds);
+
 // The sample-and-propagate loop (GraphMatch, section 3; the pseudo-code is in docs/design.md).
-// image_ids gives the image of every vertex of the ranking, ascending.
-// Pairs that the verifier knows already are answered from what it knows, in the same places where
-// an undisturbed run would have tested them: a run that goes on after an interruption follows the
-// path of the first and tests what is missing. If some known pairs are not on this path, because
-// another matcher made them, all known pairs seed the graph before the first test, and count
-// against the sampling budgets of images that rank each other within them.
+// image_ids gives the image of every vertex of the ranking, ascending. Known pairs that are neither
+// seeds nor asked for join the graph when nothing else is left to test.
 //
 // The tested pairs depend on the options, the ranking and the verifier's answers alone. Exceptions
 // of the verifier pass through.
+GraphMatchResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
+                               const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                               ThreadPool& threads,
+                               const std::function<void(const LoopProgress&)>& on_progress,
+                               const std::vector<ImagePair>& seeds);
+
+// The same with the seeds that ChooseSeeds finds without earlier ones.
 GraphMatchResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
                                const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                                ThreadPool& threads,

@@ -16,7 +16,8 @@ constexpr std::size_t kImagesPerBlock = 256;
 }  // namespace
 
 GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                                const std::function<void(const LoopProgress&)>& on_progress) {
+                                const std::function<void(const LoopProgress&)>& on_progress,
+                                const PairRestrictions& restrictions) {
   GraphBuilder builder(image_ids, verifier, on_progress);
   const std::size_t num = image_ids.size();
   double num_left = static_cast<double>(num) * static_cast<double>(num > 0 ? num - 1 : 0) / 2;
@@ -26,10 +27,11 @@ GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerif
       for (std::size_t a = first_a; a < std::min(first_a + kImagesPerBlock, num); ++a) {
         for (std::size_t b = std::max(first_b, a + 1); b < std::min(first_b + kImagesPerBlock, num);
              ++b) {
-          pairs.emplace_back(static_cast<Vertex>(a), static_cast<Vertex>(b));
+          const VertexPair pair(static_cast<Vertex>(a), static_cast<Vertex>(b));
+          --num_left;
+          if (restrictions.Allows(pair.first, pair.second)) pairs.push_back(pair);
         }
       }
-      num_left -= static_cast<double>(pairs.size());
       builder.Verify(LoopStage::kListed, 0, pairs, num_left);
       if (!builder.Continues()) break;
     }
@@ -41,7 +43,8 @@ GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerif
 
 GraphMatchResult VerifyListedPairs(const std::vector<ImagePair>& pairs,
                                    const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                                   const std::function<void(const LoopProgress&)>& on_progress) {
+                                   const std::function<void(const LoopProgress&)>& on_progress,
+                                   const PairRestrictions& restrictions) {
   GraphBuilder builder(image_ids, verifier, on_progress);
   const auto vertex = [&image_ids](ImageId image) -> std::optional<Vertex> {
     const auto place = std::lower_bound(image_ids.begin(), image_ids.end(), image);
@@ -52,7 +55,7 @@ GraphMatchResult VerifyListedPairs(const std::vector<ImagePair>& pairs,
   for (const ImagePair& pair : pairs) {
     const std::optional<Vertex> a = vertex(pair.id1);
     const std::optional<Vertex> b = vertex(pair.id2);
-    if (!a || !b || *a == *b) continue;
+    if (!a || !b || *a == *b || !restrictions.Allows(*a, *b)) continue;
     listed.push_back(MakeVertexPair(*a, *b));
   }
   std::sort(listed.begin(), listed.end());

@@ -35,6 +35,7 @@ class MatchingGraph {
   // Ascending.
   const std::vector<Vertex>& Neighbors(Vertex vertex) const { return neighbors_[vertex]; }
   bool IsTested(Vertex a, Vertex b) const;
+  std::size_t NumTestedOf(Vertex vertex) const { return tested_[vertex].size(); }
 
   // In the order in which they were added.
   const std::vector<VertexPair>& Edges() const { return edges_; }

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 
+#include "colmap_graphmatch/graph/pair_restrictions.h"
+
 namespace colmap_graphmatch {
 
 // The parameters of the sample-and-propagate loop. The first four are the paper's, with the values
@@ -46,6 +48,9 @@ struct GraphMatchOptions {
 
   // Whether sampling ends for good when an iteration of it finds no edge.
   bool stop_sampling_without_edges = false;
+
+  // Images that do not seek neither draw tests nor are propagated from.
+  PairRestrictions restrictions;
 
   // The number of tests that the formula or max_tests_for_sampling gives for N images.
   int MaxTestsForSampling(std::size_t num_images) const;

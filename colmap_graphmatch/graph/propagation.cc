@@ -12,10 +12,12 @@ constexpr std::size_t kEdgesPerTask = 64;
 // What (a, b) proposes: pairs of a with neighbours of b.
 void PropagateAlong(Vertex a, Vertex b, const GraphMatchOptions& options, const Ranking& ranking,
                     const MatchingGraph& graph, std::vector<VertexPair>* pairs) {
+  if (!options.restrictions.Seeks(a)) return;
   if (graph.Degree(a) >= static_cast<std::size_t>(options.max_num_neighbors)) return;
   std::vector<std::pair<float, Vertex>> candidates;
   for (const Vertex c : graph.Neighbors(b)) {
-    if (c == a || (options.propagate_untested_only && graph.IsTested(a, c))) continue;
+    if (c == a || options.restrictions.SameFrame(a, c)) continue;
+    if (options.propagate_untested_only && graph.IsTested(a, c)) continue;
     const bool from_source =
         options.propagation_distance == GraphMatchOptions::PropagationDistance::kSource;
     candidates.emplace_back(ranking.Distance(from_source ? a : b, c), c);

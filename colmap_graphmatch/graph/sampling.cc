@@ -21,7 +21,7 @@ std::vector<Vertex> Sampler::NextUntested(Vertex vertex, std::size_t num,
     untested.clear();
     only_tested_so_far = true;
     for (std::size_t i = cursor; i < list.size() && untested.size() < num; ++i) {
-      if (graph.IsTested(vertex, list[i])) {
+      if (graph.IsTested(vertex, list[i]) || options_.restrictions.SameFrame(vertex, list[i])) {
         if (only_tested_so_far) cursor = i + 1;
         continue;
       }
@@ -45,7 +45,8 @@ std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& gra
     const auto vertex = static_cast<Vertex>(i);
     drawn_[i].clear();
     const int num = std::min(tests, budget - num_drawn_[i]);
-    if (num <= 0 || graph.Degree(vertex) >= static_cast<std::size_t>(options_.max_num_neighbors)) {
+    if (num <= 0 || !options_.restrictions.Seeks(vertex) ||
+        graph.Degree(vertex) >= static_cast<std::size_t>(options_.max_num_neighbors)) {
       return;
     }
     drawn_[i] = NextUntested(vertex, static_cast<std::size_t>(num), graph);
@@ -60,16 +61,26 @@ std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& gra
 }
 
 void Sampler::ChargeTested(const MatchingGraph& graph) {
-  const auto budget =
-      static_cast<std::size_t>(options_.MaxTestsForSampling(ranking_.NumVertices()));
-  threads_.ParallelFor(ranking_.NumVertices(), [&](std::size_t i) {
+  const std::size_t num_vertices = ranking_.NumVertices();
+  const int budget = options_.MaxTestsForSampling(num_vertices);
+  int num_planned = 0;  // What the schedule leaves of the budget.
+  for (int iteration = 0; iteration < options_.number_sample_iterations; ++iteration) {
+    num_planned += options_.TestsInIteration(iteration, num_vertices);
+    if (num_planned >= budget) break;
+  }
+  threads_.ParallelFor(num_vertices, [&](std::size_t i) {
     const auto vertex = static_cast<Vertex>(i);
-    const std::vector<Vertex>& nearest = ranking_.NearestOf(vertex);
+    if (graph.NumTestedOf(vertex) == 0) return;
+    int num_seen = 0;
     int num_tested = 0;
-    for (std::size_t k = 0; k < std::min(budget, nearest.size()); ++k) {
-      num_tested += graph.IsTested(vertex, nearest[k]) ? 1 : 0;
+    for (const Vertex other : ranking_.NearestOf(vertex)) {
+      if (num_seen == budget) break;
+      if (graph.NumTestedOf(other) == 0) continue;
+      ++num_seen;
+      num_tested += graph.IsTested(vertex, other) ? 1 : 0;
     }
-    num_drawn_[i] = std::max(num_drawn_[i], num_tested);
+    const bool done = num_tested >= std::min(num_planned, num_seen);
+    num_drawn_[i] = std::max(num_drawn_[i], done ? budget : num_tested);
   });
 }
 

@@ -25,7 +25,9 @@ class Sampler {
   void Charge();
 
   // Charges the budget of every vertex with the tested pairs among the first MaxTestsForSampling of
-  // its ranked list: whoever tested them did what sampling would have done.
+  // its ranked list: whoever tested them did what sampling would have done. Vertices without any
+  // tested pair do not count in the list: images that were added since are not the task of those
+  // that have been sampled.
   void ChargeTested(const MatchingGraph& graph);
 
  private:

@@ -23,6 +23,13 @@ struct PipelineOptions {
   // Tests the pairs of this list (see pair_list.h) instead, unless it is empty.
   std::filesystem::path match_list_path;
 
+  // Only the images of this list (see pair_list.h) look for partners, among all images, unless it
+  // is empty: pairs of two others are not tested.
+  std::filesystem::path image_list_path;
+
+  // Leaves out pairs of images of one frame: what the cameras of a rig took at the same time.
+  bool skip_image_pairs_in_same_frame = false;
+
   // A path, or a name to be found on PATH.
   std::string colmap_path = "colmap";
 

@@ -1,32 +1,64 @@
 #include "colmap_graphmatch/pipeline/pair_list.h"
 
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
+#include <system_error>
 #include <unordered_map>
 
 #include "colmap_graphmatch/base/errors.h"
 
 namespace colmap_graphmatch {
 
-PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
+namespace {
+
+// The lines of a list, trimmed, with their numbers; without empty lines and comments.
+struct Line {
+  std::size_t number = 0;
+  std::string text;
+};
+
+std::vector<Line> ReadLines(const std::filesystem::path& path, const std::string& kind) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    throw FileError("The list of " + kind + " " + path.string() + " is a directory.");
+  }
+  std::ifstream file(path);
+  if (!file) {
+    throw FileError("Cannot read the list of " + kind + " " + path.string() + ": " +
+                    std::strerror(errno) + ".");
+  }
+  std::vector<Line> lines;
+  std::size_t number = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    if (number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);  // A byte order mark.
+    const std::size_t begin = line.find_first_not_of(" \t\r");
+    if (begin == std::string::npos || line[begin] == '#') continue;
+    lines.push_back({number, line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin)});
+  }
+  if (file.bad()) throw FileError("Cannot read " + path.string() + " to its end.");
+  if (lines.empty()) {
+    throw FileError("The list of " + kind + " " + path.string() + " is empty.");
+  }
+  return lines;
+}
+
+std::unordered_map<std::string, ImageId> IdsByName(const std::vector<ImageRecord>& images) {
   std::unordered_map<std::string, ImageId> ids;
   for (const ImageRecord& image : images) {
     if (image.num_features > 0) ids.emplace(image.name, image.id);
   }
+  return ids;
+}
 
-  std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw FileError("Cannot read the list of image pairs " + path.string() +
-                    ": there is no such file.");
-  }
+}  // namespace
+
+PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
+  const std::unordered_map<std::string, ImageId> ids = IdsByName(images);
   PairList list;
-  std::size_t line_number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++line_number;
-    if (line_number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0)
-      line.erase(0, 3);  // A byte order mark.
-    const std::size_t begin = line.find_first_not_of(" \t\r");
-    if (begin == std::string::npos || line[begin] == '#') continue;
-    line = line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin);
+  for (const auto& [line_number, line] : ReadLines(path, "image pairs")) {
     // Every way to cut it into a name, another, and what may follow, e.g. a score.
     const char separator = line.find('\t') != std::string::npos ? '\t' : ' ';
     std::vector<std::size_t> cuts;
@@ -58,15 +90,32 @@ PairList ReadPairList(const std::filesystem::path& path, const std::vector<Image
     }
     list.pairs.push_back(pair);
   }
-  if (file.bad()) throw FileError("Cannot read " + path.string() + " to its end.");
-  if (list.pairs.empty() && list.num_skipped == 0) {
-    throw FileError("The list of image pairs " + path.string() + " is empty.");
-  }
   if (list.pairs.empty()) {
     throw FileError("No line of " + path.string() +
                     " names two images with features of this database; the first is \"" +
                     list.first_skipped + "\". Are these names as in the table `images`?");
   }
+  return list;
+}
+
+ImageList ReadImageList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
+  const std::unordered_map<std::string, ImageId> ids = IdsByName(images);
+  ImageList list;
+  for (const Line& line : ReadLines(path, "images")) {
+    const auto found = ids.find(line.text);
+    if (found != ids.end()) {
+      list.images.push_back(found->second);
+    } else if (list.num_skipped++ == 0) {
+      list.first_skipped = line.text;
+    }
+  }
+  if (list.images.empty()) {
+    throw FileError("No line of " + path.string() +
+                    " names an image with features of this database; the first is \"" +
+                    list.first_skipped + "\". Are these names as in the table `images`?");
+  }
+  std::sort(list.images.begin(), list.images.end());
+  list.images.erase(std::unique(list.images.begin(), list.images.end()), list.images.end());
   return list;
 }
 

@@ -26,4 +26,17 @@ struct PairList {
 // in several ways, or if none of its lines names a pair.
 PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
 
+struct ImageList {
+  std::vector<ImageId> images;  // Ascending, each once.
+
+  // Lines that name no image of the database with features.
+  std::size_t num_skipped = 0;
+  std::string first_skipped;
+};
+
+// Reads a list of images as vocab_tree_matcher takes it (VocabTreeMatching.match_list_path): a name
+// a line; empty lines and those that begin with # are comments. Throws FileError if the file cannot
+// be read, or if none of its lines names an image.
+ImageList ReadImageList(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
+
 }  // namespace colmap_graphmatch

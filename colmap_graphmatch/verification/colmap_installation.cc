@@ -57,6 +57,12 @@ std::string ColmapInstallation::Spelling(const std::string& option) const {
   for (const char* group : {"SiftMatching.", "TwoViewGeometry.", "FeatureMatching."}) {
     if (matcher_options.count(group + option) > 0) return group + option;
   }
+  // The seed of everything random has no group, and another name before COLMAP 3.13.
+  if (option == "default_random_seed") {
+    for (const char* name : {"default_random_seed", "random_seed"}) {
+      if (matcher_options.count(name) > 0) return name;
+    }
+  }
   return "";
 }
 
@@ -102,7 +108,7 @@ ColmapInstallation DetectColmap(const std::string& colmap_path,
 
   const std::string options =
       Output({executable, "matches_importer", "-h"}, work_path / "options.txt", stop);
-  static const std::regex kOption(R"(--([A-Za-z]+\.[A-Za-z0-9_]+))");
+  static const std::regex kOption(R"(--([A-Za-z_]+(?:\.[A-Za-z0-9_]+)?))");
   for (std::sregex_iterator match(options.begin(), options.end(), kOption), end; match != end;
        ++match) {
     colmap.matcher_options.insert((*match)[1]);

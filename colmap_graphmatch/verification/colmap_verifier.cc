@@ -174,8 +174,11 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
   colmap_options["min_num_inliers"] = std::to_string(options.min_num_inliers);
   std::vector<std::string> unknown;
   arguments_ = colmap.Arguments(colmap_options, &unknown);
-  for (const std::string& name : unknown) {
-    on_warning_("COLMAP " + colmap.Version() + " has no option " + name + "; it has no effect.");
+  if (!unknown.empty()) {
+    std::string names;
+    for (const std::string& name : unknown) names += (names.empty() ? "" : ", ") + name;
+    on_warning_("COLMAP " + colmap.Version() +
+                " does not have these options, which have no effect: " + names + ".");
   }
 
   const std::filesystem::path output_path = work_path / "database_creator.txt";

@@ -1,35 +1,105 @@
 #include "colmap_graphmatch/verification/work_directory.h"
 
-#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp is POSIX, not in <cstdlib>.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
+#include <random>
 #include <string>
 #include <system_error>
 
 #include "colmap_graphmatch/base/errors.h"
 
 namespace colmap_graphmatch {
+namespace {
 
-WorkDirectory::WorkDirectory(const std::filesystem::path& parent) {
+// What the guard does, with standard input as its end of the pipe. Between fork and exec of a
+// process with threads only calls that are safe in signal handlers are allowed.
+[[noreturn]] void WatchAndRemove(const char* path) {
+  // Of another session, so that what ends this process on its terminal does not end it.
+  ::setsid();
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) ::signal(signal, SIG_IGN);
+  const int null = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  if (null >= 0) {
+    ::dup2(null, STDOUT_FILENO);
+    ::dup2(null, STDERR_FILENO);
+  }
+  ::close_range(3, ~0U, 0);
+  char byte = 0;
+  ssize_t result = 0;
+  do {
+    result = ::read(STDIN_FILENO, &byte, 1);
+  } while (result < 0 && errno == EINTR);
+  if (result != 0) ::_exit(0);
+  // The COLMAP processes die at the same moment; let them.
+  const struct timespec pause = {0, 200'000'000};
+  ::nanosleep(&pause, nullptr);
+  ::execl("/bin/rm", "rm", "-rf", "--", path, static_cast<char*>(nullptr));
+  ::_exit(1);
+}
+
+// Names that nobody can guess: mkdir says if one is taken all the same.
+std::string RandomName() {
+  static constexpr char kDigits[] = "0123456789abcdefghijklmnopqrstuv";
+  std::random_device device;
+  std::string name;
+  for (int i = 0; i < 16; ++i) name += kDigits[device() % 32];
+  return name;
+}
+
+}  // namespace
+
+WorkDirectory::WorkDirectory(const std::filesystem::path& parent, Guard guard) {
   const char* variable = std::getenv("TMPDIR");
   const std::filesystem::path base = !parent.empty()       ? parent
                                      : variable != nullptr ? std::filesystem::path(variable)
                                                            : "/tmp";
-  std::string name = (base / "graphmatch-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) {
+  path_ = std::filesystem::absolute(base) / ("graphmatch-" + RandomName());
+  // First, so that there is no moment at which the directory is there and the guard is not.
+  if (guard == Guard::kGuarded) StartGuard();
+  if (::mkdir(path_.c_str(), S_IRWXU) != 0) {
+    const int error = errno;
+    DismissGuard();
     throw FileError(
-        "Cannot make a working directory in " + base.string() + ": " + std::strerror(errno) +
+        "Cannot make a working directory in " + base.string() + ": " + std::strerror(error) +
         ". Name a directory on a disk with free space with --GraphMatching.work_path or "
         "in the environment variable TMPDIR.");
   }
-  path_ = name;
+}
+
+void WorkDirectory::StartGuard() {
+  std::array<int, 2> ends = {-1, -1};
+  // Without a guard the directory is only left behind by kill -9.
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) return;
+  guard_ = ::fork();
+  if (guard_ == 0) {
+    ::dup2(ends[0], STDIN_FILENO);
+    WatchAndRemove(path_.c_str());
+  }
+  ::close(ends[0]);
+  guard_pipe_ = ends[1];
 }
 
 WorkDirectory::~WorkDirectory() {
   std::error_code ignored;
   std::filesystem::remove_all(path_, ignored);
+  DismissGuard();
+}
+
+void WorkDirectory::DismissGuard() {
+  if (guard_pipe_ < 0) return;
+  const char done = '.';
+  const bool told = ::write(guard_pipe_, &done, 1) == 1;
+  ::close(guard_pipe_);
+  guard_pipe_ = -1;
+  if (told && guard_ > 0) ::waitpid(guard_, nullptr, 0);
 }
 
 }  // namespace colmap_graphmatch

@@ -1,15 +1,20 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
 
 namespace colmap_graphmatch {
 
-// A private directory (mode 0700) for the files of one run, removed with all its contents at the
-// end.
+// A private directory (mode 0700), removed with all its contents at the end.
 class WorkDirectory {
  public:
+  // kGuarded: a process of its own waits for the end of this one and removes the directory even
+  // after kill -9.
+  enum class Guard { kUnguarded, kGuarded };
+
   // parent: where to make it; empty: $TMPDIR, or /tmp. Throws FileError.
-  explicit WorkDirectory(const std::filesystem::path& parent);
+  explicit WorkDirectory(const std::filesystem::path& parent, Guard guard = Guard::kUnguarded);
   ~WorkDirectory();
   WorkDirectory(const WorkDirectory&) = delete;
   WorkDirectory& operator=(const WorkDirectory&) = delete;
@@ -17,7 +22,12 @@ class WorkDirectory {
   const std::filesystem::path& Path() const { return path_; }
 
  private:
+  void StartGuard();
+  void DismissGuard();
+
   std::filesystem::path path_;
+  int guard_pipe_ = -1;  // The guard acts when this end is closed without a word.
+  pid_t guard_ = -1;
 };
 
 }  // namespace colmap_graphmatch

@@ -1,0 +1,530 @@
+#include "colmap_graphmatch/cli/option_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/lexical_cast.hpp>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "colmap_graphmatch/cli/options.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using Use = OptionRow::Use;
+
+// What the user may write for an enumeration.
+template <typename Enum>
+using Names = std::map<std::string, Enum>;
+
+const Names<GraphMatchOptions::SamplingSchedule> kSchedules = {
+    {"floor", GraphMatchOptions::SamplingSchedule::kFloor},
+    {"round", GraphMatchOptions::SamplingSchedule::kRound},
+    {"carry", GraphMatchOptions::SamplingSchedule::kCarry}};
+const Names<GraphMatchOptions::PropagationDistance> kDistances = {
+    {"source", GraphMatchOptions::PropagationDistance::kSource},
+    {"neighbor", GraphMatchOptions::PropagationDistance::kNeighbor}};
+const Names<PipelineOptions::Strategy> kStrategies = {
+    {"graphmatch", PipelineOptions::Strategy::kGraphMatch},
+    {"exhaustive", PipelineOptions::Strategy::kExhaustive}};
+const Names<ColmapVerifierOptions::Matcher> kMatchers = {
+    {"auto", ColmapVerifierOptions::Matcher::kAuto},
+    {"exact", ColmapVerifierOptions::Matcher::kExact},
+    {"colmap", ColmapVerifierOptions::Matcher::kColmap}};
+const Names<ImageVectorOptions::FeatureSelection> kSelections = {
+    {"largest", ImageVectorOptions::FeatureSelection::kLargestScales},
+    {"random", ImageVectorOptions::FeatureSelection::kRandom}};
+
+constexpr std::array<const char*, 3> kMatchingGroups = {"SiftMatching.", "TwoViewGeometry.",
+                                                        "FeatureMatching."};
+
+template <typename T>
+std::optional<T> Number(const std::string& text) {
+  T value{};
+  return boost::conversion::try_lexical_convert(text, value) ? std::optional<T>(value)
+                                                             : std::nullopt;
+}
+
+// As COLMAP reads them: Boost.Program_options' own words for truth.
+std::optional<bool> Bool(const std::string& text) {
+  for (const char* word : {"1", "true", "yes", "on"}) {
+    if (text == word) return true;
+  }
+  for (const char* word : {"0", "false", "no", "off"}) {
+    if (text == word) return false;
+  }
+  return std::nullopt;
+}
+
+std::string Text(double value) { return fmt::format("{}", value); }
+
+// What an option may be, in words and as a function that stores it.
+struct Value {
+  std::string values;
+  std::string default_value;
+  std::function<bool(const std::string&)> read;
+};
+
+Value Flag(bool* field) {
+  return {"", "", [field](const std::string&) { return *field = true; }};
+}
+
+Value BoolOf(bool* field) {
+  return {"0 or 1", *field ? "1" : "0", [field](const std::string& text) {
+            const std::optional<bool> value = Bool(text);
+            if (value) *field = *value;
+            return value.has_value();
+          }};
+}
+
+Value IntOf(int* field, int minimum, const std::string& special = "") {
+  return {"an integer of at least " + std::to_string(minimum) + special, std::to_string(*field),
+          [field, minimum, special](const std::string& text) {
+            const std::optional<int> value = Number<int>(text);
+            const bool is_special = value == -1 && !special.empty();
+            if (!value || (*value < minimum && !is_special)) return false;
+            *field = *value;
+            return true;
+          }};
+}
+
+Value SeedOf(std::uint64_t* field) {
+  return {"an integer of at least 0", std::to_string(*field), [field](const std::string& text) {
+            // lexical_cast takes -1 for the greatest number.
+            const std::optional<std::uint64_t> value = Number<std::uint64_t>(text);
+            if (!value || text.find('-') != std::string::npos) return false;
+            *field = *value;
+            return true;
+          }};
+}
+
+enum class Zero { kAllowed, kNotAllowed };
+
+Value DoubleOf(double* field, Zero zero) {
+  const bool allowed = zero == Zero::kAllowed;
+  return {allowed ? "a number of at least 0" : "a number greater than 0", Text(*field),
+          [field, allowed](const std::string& text) {
+            const std::optional<double> value = Number<double>(text);
+            if (!value || !std::isfinite(*value) || *value < 0 || (!allowed && *value == 0)) {
+              return false;
+            }
+            *field = *value;
+            return true;
+          }};
+}
+
+// std::string or a path.
+template <typename T>
+Value TextOf(T* field, const std::string& values) {
+  return {values, std::string(*field), [field](const std::string& text) {
+            *field = text;
+            return !text.empty();
+          }};
+}
+
+template <typename Enum>
+Value OneOf(Enum* field, const Names<Enum>& names) {
+  Value value;
+  for (const auto& [name, entry] : names) {
+    if (entry == *field) value.default_value = name;
+    value.values += (value.values.empty() ? "one of " : ", ") + name;
+  }
+  value.read = [field, &names](const std::string& text) {
+    const auto found = names.find(text);
+    if (found != names.end()) *field = found->second;
+    return found != names.end();
+  };
+  return value;
+}
+
+Value Anything() {
+  return {"anything", "", [](const std::string&) { return true; }};
+}
+
+class Table {
+ public:
+  explicit Table(CommandLine* line) : line_(line) {}
+
+  std::vector<OptionRow> Make() {
+    AddGeneral();
+    AddGraph();
+    AddVectors();
+    AddMatching();
+    AddWork();
+    AddColmapMatching();
+    AddUnusedOptions();
+    return std::move(rows_);
+  }
+
+ private:
+  void Section(const char* section) { section_ = section; }
+
+  OptionRow& Add(const std::string& name, Value value, const std::string& help) {
+    OptionRow row;
+    row.section = section_;
+    row.name = name;
+    row.values = std::move(value.values);
+    row.default_value = std::move(value.default_value);
+    row.read = std::move(value.read);
+    row.help = help;
+    row.names = {name};
+    rows_.push_back(std::move(row));
+    return rows_.back();
+  }
+
+  OptionRow& AddColmap(Use use, std::vector<ColmapSpelling> colmap, Value value,
+                       const std::string& help) {
+    const auto newest = std::find_if(colmap.rbegin(), colmap.rend(),
+                                     [](const ColmapSpelling& s) { return !s.name.empty(); });
+    OptionRow& row = Add(newest->name, std::move(value), help);
+    row.use = use;
+    row.colmap = std::move(colmap);
+    for (const ColmapSpelling& spelling : row.colmap) AddName(spelling.name, &row);
+    return row;
+  }
+
+  static void AddName(const std::string& name, OptionRow* row) {
+    const bool is_new = std::find(row->names.begin(), row->names.end(), name) == row->names.end();
+    if (is_new && !name.empty()) row->names.push_back(name);
+  }
+
+  // An option of matching or verification: accepted in each of the groups.
+  OptionRow& AddGrouped(Use use, std::vector<ColmapSpelling> colmap, Value value,
+                        const std::string& help) {
+    OptionRow& row = AddColmap(use, std::move(colmap), std::move(value), help);
+    const std::string short_name = row.name.substr(row.name.find('.') + 1);
+    for (const char* group : kMatchingGroups) AddName(group + short_name, &row);
+    return row;
+  }
+
+  // The value goes to COLMAP as it was checked here.
+  OptionRow& AddPassedOn(std::vector<ColmapSpelling> colmap,
+                         const std::function<bool(std::string*)>& check, const std::string& values,
+                         const std::string& help) {
+    const std::string& name = colmap.back().name.empty() ? colmap.front().name : colmap.back().name;
+    const std::string key = name.substr(name.find('.') + 1);
+    std::map<std::string, std::string>* options = &line_->pipeline.verification.colmap_options;
+    const Value value = {values, "", [options, key, check](const std::string& text) {
+                           std::string checked = text;
+                           if (!check(&checked)) return false;
+                           (*options)[key] = checked;
+                           return true;
+                         }};
+    return AddGrouped(Use::kPassedOn, std::move(colmap), value, help);
+  }
+
+  OptionRow& PassBool(std::vector<ColmapSpelling> colmap, const std::string& help) {
+    const auto check = [](std::string* text) {
+      const std::optional<bool> value = Bool(*text);
+      if (value) *text = *value ? "1" : "0";
+      return value.has_value();
+    };
+    return AddPassedOn(std::move(colmap), check, "0 or 1", help);
+  }
+
+  OptionRow& PassInt(std::vector<ColmapSpelling> colmap, int minimum, const std::string& help) {
+    const auto check = [minimum](std::string* text) {
+      const std::optional<int> value = Number<int>(*text);
+      return value && *value >= minimum;
+    };
+    return AddPassedOn(std::move(colmap), check,
+                       "an integer of at least " + std::to_string(minimum), help);
+  }
+
+  OptionRow& PassDouble(std::vector<ColmapSpelling> colmap, double maximum,
+                        const std::string& help) {
+    const auto check = [maximum](std::string* text) {
+      const std::optional<double> value = Number<double>(*text);
+      return value && *value >= 0 && *value <= maximum;
+    };
+    const bool bounded = std::isfinite(maximum);
+    return AddPassedOn(std::move(colmap), check,
+                       bounded ? "a number from 0 to " + Text(maximum) : "a number of at least 0",
+                       help);
+  }
+
+  OptionRow& PassText(std::vector<ColmapSpelling> colmap, const std::string& help) {
+    return AddPassedOn(
+        std::move(colmap), [](std::string*) { return true; }, "a text", help);
+  }
+
+  void AddUnused(std::vector<ColmapSpelling> colmap, const std::string& why) {
+    AddColmap(Use::kUnused, std::move(colmap), Anything(), why);
+  }
+
+  void AddGeneral();
+  void AddGraph();
+  void AddVectors();
+  void AddMatching();
+  void AddWork();
+  void AddColmapMatching();
+  void AddUnusedOptions();
+
+  CommandLine* line_;
+  const char* section_ = "";
+  std::vector<OptionRow> rows_;
+};
+
+void Table::AddGeneral() {
+  PipelineOptions& p = line_->pipeline;
+  Section("General");
+  Add("help", Flag(&line_->help), "print this help").names.emplace_back("h");
+  Add("version", Flag(&line_->version), "print the version");
+  AddColmap(Use::kHere, {{{3, 8}, "database_path", ""}},
+            TextOf(&p.database_path, "the path of a COLMAP database"),
+            "the COLMAP database with the features; the matches are written to it");
+  AddColmap(Use::kHere, {{{3, 8}, "project_path", ""}},
+            TextOf(&line_->project_path, "the path of a file"),
+            "an ini file with options, as COLMAP writes it; the command line goes before");
+  Add("colmap_path", TextOf(&p.colmap_path, "a path, or a name on PATH"),
+      "the COLMAP program: a path, or a name on PATH");
+  AddColmap(Use::kHere, {{{3, 8}, "random_seed", "0"}, {{3, 13}, "default_random_seed", "0"}},
+            SeedOf(&p.seed),
+            "seed (>= 0) of this program's random choices, and handed on to COLMAP");
+}
+
+void Table::AddGraph() {
+  PipelineOptions& p = line_->pipeline;
+  Section("GraphMatch: which pairs are tested");
+  Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategies),
+      "which pairs are tested: those that graphmatch finds, or exhaustive: all");
+  Add("GraphMatching.match_list_path", TextOf(&p.match_list_path, "the path of a list of pairs"),
+      "a file of image pairs to be tested instead, two names a line");
+  AddColmap(Use::kHere, {{{3, 8}, "VocabTreeMatching.match_list_path", ""}},
+            TextOf(&p.image_list_path, "the path of a list of images"),
+            "a file of image names, one a line: only these look for partners, among all images");
+  Add("GraphMatching.number_sample_iterations", IntOf(&p.graph.number_sample_iterations, 0),
+      "iterations (>= 0) that sample before propagating; later ones only propagate");
+  Add("GraphMatching.max_tests_for_sampling", IntOf(&p.graph.max_tests_for_sampling, 0),
+      "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N images. "
+      "More finds weaker links and costs up to N tests for each");
+  OptionRow& neighbors =
+      Add("GraphMatching.max_num_neighbors", IntOf(&p.graph.max_num_neighbors, 1),
+          "neighbours (>= 1) after which an image looks for no more itself. Fewer thins dense "
+          "scenes. VocabTreeMatching.num_images is another name for it");
+  neighbors.use = Use::kHere;
+  neighbors.colmap = {{{3, 8}, "VocabTreeMatching.num_images", "100"}};
+  AddName("VocabTreeMatching.num_images", &neighbors);
+  Add("GraphMatching.num_to_propagate", IntOf(&p.graph.num_to_propagate, 0),
+      "images (>= 0) that each neighbour hands on to an image in an iteration");
+  Add("GraphMatching.sampling_schedule", OneOf(&p.graph.sampling_schedule, kSchedules),
+      "tests an iteration: budget / iterations as floor, round, or carry (spends it all)");
+  Add("GraphMatching.count_incoming_tests", BoolOf(&p.graph.count_incoming_tests),
+      "tests drawn by other images count against an image's budget, too");
+  Add("GraphMatching.propagation_distance", OneOf(&p.graph.propagation_distance, kDistances),
+      "rank a neighbour's neighbours by their distance to the image itself (source) or to the "
+      "neighbor");
+  Add("GraphMatching.propagate_untested_only", BoolOf(&p.graph.propagate_untested_only),
+      "take the best among the untested; 0: among all, then drop the tested");
+  Add("GraphMatching.propagate_from_new_edges_only",
+      BoolOf(&p.graph.propagate_from_new_edges_only), "propagate along each edge only once");
+  Add("GraphMatching.stop_sampling_without_edges", BoolOf(&p.graph.stop_sampling_without_edges),
+      "end sampling after an iteration that found no edge");
+}
+
+void Table::AddVectors() {
+  ImageVectorOptions& vectors = line_->pipeline.vectors;
+  Section("GraphMatch: how images are described");
+  Add("GraphMatching.num_components", IntOf(&vectors.gmm.num_components, 1),
+      "Gaussians (>= 1) of the mixture; time and memory grow in proportion");
+  Add("GraphMatching.max_num_features", IntOf(&vectors.max_num_features, 1),
+      "features (>= 1) of an image that are encoded at most");
+  Add("GraphMatching.feature_selection", OneOf(&vectors.feature_selection, kSelections),
+      "which, if it has more: those of the largest scales, or random ones");
+  Add("GraphMatching.num_training_descriptors", IntOf(&vectors.num_training_descriptors, 1),
+      "descriptors (>= 1) that the mixture is learnt from");
+}
+
+void Table::AddMatching() {
+  PipelineOptions& p = line_->pipeline;
+  ExactMatcherOptions& exact = p.verification.exact;
+  Section("GraphMatch: how descriptors are matched");
+  Add("GraphMatching.matcher", OneOf(&p.verification.matcher, kMatchers),
+      "exact: by this program; colmap: by COLMAP; auto: by COLMAP if it has a GPU and use_gpu is "
+      "on, else exact");
+  Add("GraphMatching.cache_gb", DoubleOf(&exact.cache_gb, Zero::kAllowed),
+      "GB (>= 0) of descriptors kept in memory; 0: a quarter of the memory. Less reads images more "
+      "often");
+  Add("GraphMatching.preemptive_num_features", IntOf(&exact.preemptive_num_features, 0),
+      "features (>= 1) of the largest scales that are matched first, to give up pairs with few "
+      "matches early; 0: match all at once");
+  Add("GraphMatching.preemptive_min_matches", IntOf(&exact.preemptive_min_matches, 1),
+      "matches (>= 1) of those that a pair needs, or else it counts as tested, without an edge");
+}
+
+void Table::AddWork() {
+  PipelineOptions& p = line_->pipeline;
+  Section("GraphMatch: how COLMAP is run");
+  Add("GraphMatching.num_processes", IntOf(&p.verification.num_processes, 0),
+      "COLMAP processes at a time; 0: one a core without a GPU, else one");
+  Add("GraphMatching.max_pairs_per_shard", IntOf(&p.verification.max_pairs_per_shard, 1),
+      "pairs (>= 1) that COLMAP gets at a time; kill -9 loses at most so many verified pairs a "
+      "process");
+  Add("GraphMatching.timeout_per_pair",
+      DoubleOf(&p.verification.timeout_per_pair, Zero::kNotAllowed),
+      "seconds (> 0) a pair after which COLMAP counts as hanging");
+  Add("GraphMatching.lock_timeout", DoubleOf(&p.verification.lock_timeout, Zero::kAllowed),
+      "seconds (>= 0) to wait while another program locks the database");
+  Add("GraphMatching.work_path", TextOf(&p.work_path, "the path of a directory"),
+      "where temporary files go (default: $TMPDIR or /tmp); some 100 MB a process");
+}
+
+void Table::AddColmapMatching() {
+  PipelineOptions& p = line_->pipeline;
+  DescriptorMatchingOptions& matching = p.verification.exact.matching;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Section("COLMAP's options of matching and verification, accepted in each of the groups "
+          "SiftMatching, TwoViewGeometry and FeatureMatching");
+  AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.use_gpu", "1"}, {{3, 13}, "FeatureMatching.use_gpu", "1"}},
+             BoolOf(&p.verification.use_gpu), "match on the GPU if the installed COLMAP can");
+  PassText({{{3, 8}, "SiftMatching.gpu_index", "-1"}, {{3, 13}, "FeatureMatching.gpu_index", "-1"}},
+           "which GPUs, e.g. 0,1; -1: all");
+  AddGrouped(Use::kHere,
+             {{{3, 8}, "SiftMatching.num_threads", "-1"}, {{3, 13}, "FeatureMatching.num_threads", "-1"}},
+             IntOf(&p.num_threads, 1, ", or -1 for all cores"),
+             "cores to use at a time, COLMAP's included; -1: all");
+  AddGrouped(Use::kHere, {{{3, 13}, "FeatureMatching.type", "SIFT"}, {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},
+             {"one of SIFT, SIFT_BRUTEFORCE, SIFT_LIGHTGLUE: only SIFT features are matched", "",
+              [line = line_](const std::string& text) {
+                line->lightglue = text == "SIFT_LIGHTGLUE";
+                return line->lightglue || text == "SIFT_BRUTEFORCE" || text == "SIFT";
+              }},
+             "how descriptors are matched; SIFT_LIGHTGLUE: by COLMAP 4");
+  AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.max_ratio", "0.8"}},
+             DoubleOf(&matching.max_ratio, Zero::kNotAllowed),
+             "greatest ratio of the angles to the best and the second best match");
+  AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.max_distance", "0.7"}},
+             DoubleOf(&matching.max_distance, Zero::kNotAllowed),
+             "greatest angle to the best match, in radians");
+  AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.cross_check", "1"}},
+             BoolOf(&matching.cross_check),
+             "keep a match only if it is the best in both directions");
+  AddGrouped(Use::kHere,
+             {{{3, 8}, "SiftMatching.max_num_matches", "32768"},
+              {{3, 13}, "FeatureMatching.max_num_matches", "32768"}},
+             IntOf(&matching.max_num_matches, 1), "features of an image that are matched at most");
+  PassBool({{{3, 8}, "SiftMatching.guided_matching", "0"},
+            {{3, 13}, "FeatureMatching.guided_matching", "0"}},
+           "match again along the epipolar geometry that was found");
+  AddGrouped(Use::kHere,
+             {{{3, 8}, "SiftMatching.min_num_inliers", "15"},
+              {{3, 9}, "TwoViewGeometry.min_num_inliers", "15"}},
+             IntOf(&p.verification.min_num_inliers, 1), "inliers that make a pair an edge");
+  PassDouble({{{3, 8}, "SiftMatching.max_error", "4"}, {{3, 9}, "TwoViewGeometry.max_error", "4"}},
+             kInfinity, "greatest epipolar error of an inlier, in pixels");
+  PassDouble({{{3, 8}, "SiftMatching.confidence", "0.999"},
+              {{3, 9}, "TwoViewGeometry.confidence", "0.999"}},
+             1, "confidence of RANSAC");
+  PassInt({{{3, 8}, "SiftMatching.max_num_trials", "10000"},
+           {{3, 9}, "TwoViewGeometry.max_num_trials", "10000"}},
+          1, "trials of RANSAC at most");
+  PassDouble({{{3, 8}, "SiftMatching.min_inlier_ratio", "0.25"},
+              {{3, 9}, "TwoViewGeometry.min_inlier_ratio", "0.25"},
+              {{4, 2}, "TwoViewGeometry.min_inlier_ratio", "0"}},
+             1, "inlier ratio that RANSAC counts on");
+  PassBool({{{3, 8}, "SiftMatching.multiple_models", "0"},
+            {{3, 9}, "TwoViewGeometry.multiple_models", "0"}},
+           "look for several motions in a pair");
+  PassBool({{{3, 8}, "SiftMatching.compute_relative_pose", "0"},
+            {{3, 9}, "TwoViewGeometry.compute_relative_pose", "0"}},
+           "store the relative pose as well");
+  PassBool({{{3, 8}, "SiftMatching.planar_scene", "0"}, {{3, 9}, "", ""}}, "the scene is planar");
+  PassBool({{{3, 12}, "SiftMatching.cpu_brute_force_matcher", "0"}},
+           "match exactly where COLMAP matches without a GPU; much slower");
+  PassBool({{{3, 13}, "TwoViewGeometry.detect_watermark", "1"}},
+           "mark pairs that only a watermark links");
+  PassBool({{{3, 13}, "TwoViewGeometry.multiple_ignore_watermark", "1"}},
+           "leave watermarks out of several motions");
+  PassDouble({{{3, 13}, "TwoViewGeometry.watermark_detection_max_error", "4"}}, kInfinity,
+             "greatest error of a watermark's inlier, in pixels");
+  PassBool({{{3, 13}, "TwoViewGeometry.filter_stationary_matches", "0"}},
+           "drop matches at the same place in both images");
+  PassDouble({{{3, 13}, "TwoViewGeometry.stationary_matches_max_error", "4"}}, kInfinity,
+             "what the same place means, in pixels");
+  PassInt({{{3, 13}, "TwoViewGeometry.random_seed", "-1"}}, -1,
+          "seed of RANSAC, the same for every pair; -1: of the thread");
+  PassBool({{{4, 2}, "TwoViewGeometry.use_degensac", "0"}}, "use DEGENSAC");
+  PassBool({{{4, 2}, "TwoViewGeometry.use_sampson_refinement", "1"}}, "refine by Sampson errors");
+  AddGrouped(Use::kHere, {{{4, 0}, "FeatureMatching.skip_image_pairs_in_same_frame", "0"}},
+             BoolOf(&p.skip_image_pairs_in_same_frame),
+             "do not test pairs of images that a rig took at the same time");
+  PassDouble({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, 1,
+             "score of a match by LightGlue");
+  PassText({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, "the model of LightGlue");
+}
+
+void Table::AddUnusedOptions() {
+  Section("Accepted without effect");
+  const char* tree = "there is no vocabulary tree";
+  AddUnused({{{3, 8}, "VocabTreeMatching.vocab_tree_path", ""}}, tree);
+  AddUnused({{{3, 8}, "VocabTreeMatching.num_nearest_neighbors", "5"}}, tree);
+  AddUnused({{{3, 8}, "VocabTreeMatching.num_checks", "256"},
+             {{3, 13}, "VocabTreeMatching.num_checks", "64"}},
+            tree);
+  AddUnused({{{3, 8}, "VocabTreeMatching.num_images_after_verification", "0"}}, tree);
+  AddUnused({{{3, 8}, "VocabTreeMatching.max_num_features", "-1"}}, tree);
+  AddUnused({{{3, 12}, "VocabTreeMatching.num_threads", "-1"}}, tree);
+  AddUnused({{{4, 0}, "FeatureMatching.skip_geometric_verification", "0"}},
+            "pairs are found by verifying them");
+  AddUnused({{{3, 13}, "FeatureMatching.rig_verification", "0"}},
+            "verify rigs afterwards with `colmap geometric_verifier`");
+
+  const char* log = "of COLMAP's log";
+  AddUnused({{{3, 8}, "log_to_stderr", "0"}, {{3, 9}, "log_to_stderr", "1"}, {{4, 0}, "", ""}},
+            log);
+  AddUnused({{{3, 8}, "log_level", "2"}, {{3, 9}, "log_level", "0"}}, log);
+  AddUnused({{{4, 0}, "log_target", "stderr_and_file"}}, log);
+  AddUnused({{{4, 0}, "log_path", ""}}, log);
+  AddUnused({{{4, 0}, "log_severity", "0"}}, log);
+  AddUnused({{{4, 0}, "log_color", "1"}}, log);
+
+  using NamesAndDefaults = std::vector<std::pair<const char*, const char*>>;
+  const char* sift = "only SIFT features are matched";
+  for (const auto& [name, default_value] :
+       NamesAndDefaults{{"brute_force_min_cossim", "0.85"},
+                        {"brute_force_max_ratio", "1"},
+                        {"brute_force_cross_check", "1"},
+                        {"bruteforce_model_path", ""},
+                        {"lightglue_min_score", "0.1"},
+                        {"lightglue_model_path", ""}}) {
+    AddUnused({{{4, 0}, std::string("AlikedMatching.") + name, default_value}}, sift);
+  }
+  for (const auto& [name, default_value] : NamesAndDefaults{{"min_score", "0.1"},
+                                                            {"use_bf16", "0"},
+                                                            {"b_model_path", ""},
+                                                            {"b_model_path_bf16", ""},
+                                                            {"b128_model_path", ""},
+                                                            {"b128_model_path_bf16", ""},
+                                                            {"r_model_path", ""},
+                                                            {"r_model_path_bf16", ""},
+                                                            {"l_model_path", ""},
+                                                            {"l_model_path_bf16", ""},
+                                                            {"g_model_path", ""},
+                                                            {"g_model_path_bf16", ""},
+                                                            {"brute_force_min_cossim", "0.85"},
+                                                            {"brute_force_max_ratio", "1"},
+                                                            {"brute_force_cross_check", "1"},
+                                                            {"brute_force_model_path", ""}}) {
+    AddUnused({{{4, 2}, std::string("LomaMatching.") + name, default_value}}, sift);
+  }
+}
+
+}  // namespace
+
+const ColmapSpelling* OptionRow::In(const ColmapVersion& version) const {
+  const ColmapSpelling* found = nullptr;
+  for (const ColmapSpelling& spelling : colmap) {
+    if (!(version < spelling.first)) found = &spelling;
+  }
+  return found == nullptr || found->name.empty() ? nullptr : found;
+}
+
+std::vector<OptionRow> MakeOptionTable(CommandLine* line) { return Table(line).Make(); }
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+namespace colmap_graphmatch {
+
+struct CommandLine;
+
+// A version of COLMAP, as far as its options are concerned.
+struct ColmapVersion {
+  int major = 0;
+  int minor = 0;
+
+  friend bool operator<(const ColmapVersion& a, const ColmapVersion& b) {
+    return std::tie(a.major, a.minor) < std::tie(b.major, b.minor);
+  }
+};
+
+// How an option of `colmap vocab_tree_matcher` is spelt from a version of COLMAP on, and its
+// default there.
+struct ColmapSpelling {
+  ColmapVersion first;
+  std::string name;  // Empty: no longer there.
+  std::string default_value;
+};
+
+// Everything there is to know about an option. The command line, project files, what COLMAP is
+// handed, the help and docs/options.md all come from the rows of one table.
+struct OptionRow {
+  enum class Use {
+    kOwn,       // An option of this program alone,
+    kHere,      // one of vocab_tree_matcher that this program acts on,
+    kPassedOn,  // one that goes to the installed COLMAP, in its spelling,
+    kUnused,    // one that is accepted and has no meaning without a vocabulary tree.
+  };
+
+  std::string section;
+  std::string name;   // The spelling that the help shows: for options of COLMAP its newest one.
+  Use use = Use::kOwn;
+  std::string values;  // What follows "it must be" in the error; empty: a flag without a value.
+  std::string default_value;
+  std::string help;
+  std::vector<ColmapSpelling> colmap;  // Ascending; empty for options of this program.
+
+  // All names under which it is accepted, `name` first: those that any version of COLMAP has, and
+  // for options of matching and verification each of the groups SiftMatching, TwoViewGeometry and
+  // FeatureMatching, between which COLMAP moved them.
+  std::vector<std::string> names;
+
+  // Stores the value. False if it is not one of `values`.
+  std::function<bool(const std::string& text)> read;
+
+  // The spelling and default in a version of COLMAP, or null if it has no such option.
+  const ColmapSpelling* In(const ColmapVersion& version) const;
+};
+
+// The table. Its rows store what they read in `line`, which must outlive them; defaults are those
+// of `line` as it is now.
+std::vector<OptionRow> MakeOptionTable(CommandLine* line);
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,213 @@
+#include "colmap_graphmatch/database/state_file.h"
+
+#include <array>
+#include <boost/crc.hpp>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/lock_holder.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// "GMst", in the place that SQLite has for telling what a database is (PRAGMA application_id).
+constexpr std::int64_t kApplicationId = 0x474D7374;
+
+// Of the layout of the tables and of the meaning of what is in them.
+constexpr std::int64_t kFormatVersion = 1;
+
+std::int64_t Checksum(const void* data, std::size_t size) {
+  boost::crc_32_type crc;
+  crc.process_bytes(data, size);
+  return crc.checksum();
+}
+
+std::int64_t ReadNumber(sqlite::Connection& connection, const std::string& sql) {
+  sqlite::Statement select(connection, sql);
+  return select.Step() ? select.Int(0) : 0;
+}
+
+void CreateTables(sqlite::Connection& connection) {
+  connection.Execute("CREATE TABLE mixture(key TEXT NOT NULL, checksum INTEGER NOT NULL, "
+                     "data BLOB NOT NULL)");
+  connection.Execute("CREATE TABLE vectors(image_id INTEGER PRIMARY KEY NOT NULL, features INTEGER "
+                     "NOT NULL, checksum INTEGER NOT NULL, data BLOB NOT NULL)");
+  connection.Execute("CREATE TABLE run(key TEXT NOT NULL)");
+  connection.Execute("CREATE TABLE seeds(pair_id INTEGER PRIMARY KEY NOT NULL)");
+  connection.Execute("PRAGMA application_id = " + std::to_string(kApplicationId));
+  connection.Execute("PRAGMA user_version = " + std::to_string(kFormatVersion));
+}
+
+// For a file that SQLite cannot read any more. No connection to it may be open in this process: that
+// would lose its locks.
+bool HeaderIsOurs(const std::filesystem::path& path) {
+  // SQLite keeps the number big-endian at this place of the header.
+  constexpr std::streamoff kOffset = 68;
+  std::array<unsigned char, 4> bytes = {};
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(kOffset);
+  file.read(reinterpret_cast<char*>(bytes.data()), bytes.size());
+  std::int64_t id = 0;
+  for (const unsigned char byte : bytes) id = id * 256 + byte;
+  return file && id == kApplicationId;
+}
+
+// Whether the tables are there and whole. (Rows have checksums of their own.)
+bool IsIntact(sqlite::Connection& connection) {
+  try {
+    for (const char* table : {"mixture", "vectors", "run", "seeds"}) {
+      if (connection.Columns(table).empty()) return false;
+    }
+    sqlite::Statement check(connection, "PRAGMA quick_check(1)");
+    return check.Step() && check.Text(0) == "ok";
+  } catch (const DatabaseError&) {
+    return false;
+  }
+}
+
+enum class Content { kEmpty, kIntact, kToBeMadeAnew, kSomethingElse };
+
+Content Examine(sqlite::Connection& connection) {
+  if (ReadNumber(connection, "PRAGMA application_id") != kApplicationId) {
+    const bool is_empty = ReadNumber(connection, "SELECT count(*) FROM sqlite_master") == 0;
+    return is_empty ? Content::kEmpty : Content::kSomethingElse;
+  }
+  const bool same_version = ReadNumber(connection, "PRAGMA user_version") == kFormatVersion;
+  return same_version && IsIntact(connection) ? Content::kIntact : Content::kToBeMadeAnew;
+}
+
+}  // namespace
+
+std::filesystem::path StateFile::PathFor(const std::filesystem::path& database_path) {
+  std::error_code error;
+  std::filesystem::path path = std::filesystem::canonical(database_path, error);
+  if (error) path = database_path;
+  path += ".graphmatch";
+  return path;
+}
+
+StateFile::StateFile(const std::filesystem::path& path, double lock_timeout_seconds)
+    : path_(path), connection_(Open(path, lock_timeout_seconds)) {}
+
+sqlite::Connection StateFile::Open(const std::filesystem::path& path, double lock_timeout_seconds) {
+  const auto something_else = [&path] {
+    return DatabaseError(path.string() +
+                         " is in the way: it is not a file of this program, which keeps there what "
+                         "speeds up the next run. Move it, or delete it.");
+  };
+  for (bool made_anew = false;; made_anew = true) {
+    Content content = Content::kToBeMadeAnew;
+    try {
+      sqlite::Connection connection(path, sqlite::Access::kCreate, lock_timeout_seconds);
+      // The lock stays when a transaction ends. What is lost in a crash is only worth the time to
+      // compute it.
+      connection.Execute("PRAGMA locking_mode = EXCLUSIVE");
+      connection.Execute("PRAGMA synchronous = OFF");
+      sqlite::Transaction transaction(connection, sqlite::Transaction::Kind::kExclusive);
+      content = Examine(connection);
+      if (content == Content::kEmpty) CreateTables(connection);
+      transaction.Commit();
+      if (content == Content::kEmpty || content == Content::kIntact) return connection;
+    } catch (const DatabaseLockedError&) {
+      throw DatabaseLockedError(
+          "Another graphmatch_matcher works on this database: it holds " + path.string() + " (" +
+          DescribeLockHolders(path) +
+          "). Let it finish, or wait longer with --GraphMatching.lock_timeout.");
+    } catch (const sqlite::DamagedFileError&) {
+      if (!HeaderIsOurs(path)) throw something_else();
+    }
+    if (content == Content::kSomethingElse || made_anew) throw something_else();
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+    std::filesystem::remove(path.string() + "-journal", ignored);
+  }
+}
+
+std::optional<sqlite::Blob> StateFile::ReadMixture(const std::string& key) {
+  sqlite::Statement select(connection_, "SELECT data, checksum FROM mixture WHERE key = ?1");
+  if (!select.Bind(1, key).Step()) return std::nullopt;
+  sqlite::Blob mixture = select.CopyBlob(0);
+  if (Checksum(mixture.data(), mixture.size()) != select.Int(1)) return std::nullopt;
+  return mixture;
+}
+
+void StateFile::WriteMixture(const std::string& key, const sqlite::Blob& mixture) {
+  sqlite::Transaction transaction(connection_);
+  connection_.Execute("DELETE FROM mixture");
+  connection_.Execute("DELETE FROM vectors");
+  sqlite::Statement insert(connection_, "INSERT INTO mixture VALUES(?1, ?2, ?3)");
+  insert.Bind(1, key).Bind(2, Checksum(mixture.data(), mixture.size())).Bind(3, mixture).Run();
+  transaction.Commit();
+}
+
+std::size_t StateFile::CountVectors(const std::vector<ImageFingerprint>& images) {
+  sqlite::Statement select(connection_,
+                           "SELECT 1 FROM vectors WHERE image_id = ?1 AND features = ?2");
+  std::size_t count = 0;
+  for (const ImageFingerprint& image : images) {
+    if (select.Bind(1, std::int64_t{image.id}).Bind(2, image.features).Step()) ++count;
+    select.Reset();
+  }
+  return count;
+}
+
+std::vector<bool> StateFile::ReadVectors(const std::vector<ImageFingerprint>& images,
+                                         std::size_t dim, float* vectors) {
+  std::vector<bool> found(images.size());
+  sqlite::Statement select(
+      connection_, "SELECT data, checksum FROM vectors WHERE image_id = ?1 AND features = ?2");
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (select.Bind(1, std::int64_t{images[i].id}).Bind(2, images[i].features).Step()) {
+      const std::uint8_t* data = select.Data(0);
+      const std::size_t size = dim * sizeof(float);
+      if (select.Size(0) == size && Checksum(data, size) == select.Int(1)) {
+        std::memcpy(vectors + i * dim, data, size);
+        found[i] = true;
+      }
+    }
+    select.Reset();
+  }
+  return found;
+}
+
+void StateFile::WriteVectors(const std::vector<ImageFingerprint>& images, std::size_t dim,
+                             const float* vectors) {
+  sqlite::Transaction transaction(connection_);
+  sqlite::Statement insert(connection_, "INSERT OR REPLACE INTO vectors VALUES(?1, ?2, ?3, ?4)");
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(vectors + i * dim);
+    const sqlite::Blob data(bytes, bytes + dim * sizeof(float));
+    insert.Bind(1, std::int64_t{images[i].id})
+        .Bind(2, images[i].features)
+        .Bind(3, Checksum(data.data(), data.size()))
+        .Bind(4, data)
+        .Run();
+  }
+  transaction.Commit();
+}
+
+std::vector<ImagePair> StateFile::ReadSeeds(const std::string& key) {
+  sqlite::Statement run(connection_, "SELECT 1 FROM run WHERE key = ?1");
+  if (!run.Bind(1, key).Step()) return {};
+  sqlite::Statement select(connection_, "SELECT pair_id FROM seeds ORDER BY pair_id");
+  std::vector<ImagePair> seeds;
+  while (select.Step()) seeds.push_back(DecodePair(static_cast<PairId>(select.Int(0))));
+  return seeds;
+}
+
+void StateFile::WriteSeeds(const std::string& key, const std::vector<ImagePair>& seeds) {
+  sqlite::Transaction transaction(connection_);
+  connection_.Execute("DELETE FROM run");
+  connection_.Execute("DELETE FROM seeds");
+  sqlite::Statement run(connection_, "INSERT INTO run VALUES(?1)");
+  run.Bind(1, key).Run();
+  sqlite::Statement insert(connection_, "INSERT INTO seeds VALUES(?1)");
+  for (const ImagePair& pair : seeds) {
+    insert.Bind(1, static_cast<std::int64_t>(EncodePair(pair))).Run();
+  }
+  transaction.Commit();
+}
+
+}  // namespace colmap_graphmatch

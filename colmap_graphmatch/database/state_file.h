@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/database/features.h"
+#include "colmap_graphmatch/database/sqlite.h"
+
+namespace colmap_graphmatch {
+
+// What a run keeps beside the user's database for the next one: the mixture, the Fisher vectors and
+// the seeds of the loop, in the file DATABASE.graphmatch (docs/formats.md). The file is held locked
+// as long as the object lives, so that only one run works on a database at a time. What is damaged
+// in it is as if it were not there; it can be deleted at any time and costs only what it saves.
+//
+// Errors: DatabaseError, e.g. if the file cannot be written; DatabaseLockedError if another run held
+// it for longer than the given time.
+class StateFile {
+ public:
+  // The file that belongs to a database. Links are followed: a database has one state.
+  static std::filesystem::path PathFor(const std::filesystem::path& database_path);
+
+  // Opens the file or makes it; one that is damaged or of another version is made anew. Throws
+  // DatabaseError if something else is in its place.
+  StateFile(const std::filesystem::path& path, double lock_timeout_seconds);
+
+  const std::filesystem::path& Path() const { return path_; }
+
+  // The mixture that was stored with the same key: what it depends on. Any bytes of the caller.
+  std::optional<sqlite::Blob> ReadMixture(const std::string& key);
+  // Drops all vectors: they belong to another mixture.
+  void WriteMixture(const std::string& key, const sqlite::Blob& mixture);
+
+  // How many of the images have a vector that was stored for the same features.
+  std::size_t CountVectors(const std::vector<ImageFingerprint>& images);
+  // Fills the rows (dim floats each) of `vectors` of those images; true for each of them.
+  std::vector<bool> ReadVectors(const std::vector<ImageFingerprint>& images, std::size_t dim,
+                                float* vectors);
+  // vectors: a row of dim floats for each of the images.
+  void WriteVectors(const std::vector<ImageFingerprint>& images, std::size_t dim,
+                    const float* vectors);
+
+  // The seeds that were stored with the same key, ascending; none if there are no such.
+  std::vector<ImagePair> ReadSeeds(const std::string& key);
+  void WriteSeeds(const std::string& key, const std::vector<ImagePair>& seeds);
+
+ private:
+  static sqlite::Connection Open(const std::filesystem::path& path, double lock_timeout_seconds);
+
+  std::filesystem::path path_;
+  sqlite::Connection connection_;
+};
+
+}  // namespace colmap_graphmatch

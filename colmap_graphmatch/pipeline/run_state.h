@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/database/state_file.h"
+#include "colmap_graphmatch/encoding/gmm.h"
+#include "colmap_graphmatch/pipeline/image_vectors.h"
+
+namespace colmap_graphmatch {
+
+// What this run keeps for the next one, in the state file of the database, and what it finds there.
+// A file that cannot be written costs a warning: the run goes on without.
+class RunState {
+ public:
+  using Say = std::function<void(const std::string&)>;
+
+  // Waits for another run on the same database, up to lock_timeout_seconds. Throws
+  // DatabaseLockedError if it is still at work then; DatabaseError if something else is in the place
+  // of the file.
+  RunState(const std::filesystem::path& database_path, double lock_timeout_seconds, const Say& info,
+           const Say& warn);
+
+  // Chooses what is kept: vectors of these images under these options.
+  void Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images);
+
+  // The mixture of an earlier run, if at least half of the images have a vector under it. With more
+  // new images than that it is worth learning another one.
+  std::optional<GaussianMixture> ReadMixture();
+  void KeepMixture(const GaussianMixture& mixture);
+
+  // Fills the rows (dim floats) of the images that have a vector; true for each of them.
+  std::vector<bool> ReadVectors(std::size_t dim, float* vectors);
+  // vectors: a row for each of these images, given by their places among the selected ones.
+  void KeepVectors(const std::vector<std::size_t>& which, std::size_t dim, const float* vectors);
+
+  // The seeds of the loop under the same images, mixture and loop_key.
+  std::vector<ImagePair> ReadSeeds(const std::string& loop_key);
+  void KeepSeeds(const std::string& loop_key, const std::vector<ImagePair>& seeds);
+
+ private:
+  // Runs it, if there is a file. An error ends the use of the file.
+  void Try(const std::function<void()>& action);
+  std::string SeedsKey(const std::string& loop_key) const;
+
+  Say warn_;
+  std::unique_ptr<StateFile> file_;
+  bool usable_ = false;
+  std::string vectors_key_;
+  std::string mixture_checksum_;
+  std::vector<ImageFingerprint> images_;
+};
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,212 @@
+#include "colmap_graphmatch/cli/options.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/cli/option_table.h"
+#include "tests/support/synthetic_database.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Pair;
+
+CommandLine Parse(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {"graphmatch_matcher", "--database_path", "database.db"});
+  std::vector<const char*> argv;
+  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+  return ParseCommandLine(static_cast<int>(argv.size()), argv.data());
+}
+
+std::string ErrorOf(const std::vector<std::string>& arguments) {
+  try {
+    Parse(arguments);
+  } catch (const OptionsError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(OptionTable, NamesBelongToOneRow) {
+  CommandLine line;
+  std::set<std::string> names;
+  for (const OptionRow& row : MakeOptionTable(&line)) {
+    EXPECT_EQ(row.names.front(), row.name);
+    for (const std::string& name : row.names) EXPECT_TRUE(names.insert(name).second) << name;
+    EXPECT_FALSE(row.help.empty()) << row.name;
+  }
+}
+
+TEST(OptionTable, EveryRowTakesItsDefaultAndRefusesWhatItMustNotBe) {
+  CommandLine line;
+  for (const OptionRow& row : MakeOptionTable(&line)) {
+    if (!row.default_value.empty()) {
+      EXPECT_TRUE(row.read(row.default_value)) << row.name;
+    }
+    for (const ColmapSpelling& spelling : row.colmap) {
+      if (spelling.default_value.empty()) continue;
+      EXPECT_TRUE(row.read(spelling.default_value)) << row.name << " " << spelling.default_value;
+    }
+    const bool is_checked = row.values.find("integer") != std::string::npos ||
+                            row.values.find("number") != std::string::npos ||
+                            row.values.find("one of") != std::string::npos || row.values == "0 or 1";
+    if (!is_checked) continue;
+    for (const char* text : {"", "-2", "x", "1e999", "nan", "1 2", "0x"}) {
+      EXPECT_FALSE(row.read(text)) << row.name << " \"" << text << "\"";
+    }
+  }
+}
+
+TEST(OptionTable, TellsSpellingsByVersion) {
+  CommandLine line;
+  for (const OptionRow& row : MakeOptionTable(&line)) {
+    if (row.name != "TwoViewGeometry.min_inlier_ratio") continue;
+    EXPECT_EQ(row.In({3, 7}), nullptr);
+    EXPECT_EQ(row.In({3, 8})->name, "SiftMatching.min_inlier_ratio");
+    EXPECT_EQ(row.In({3, 12})->name, "TwoViewGeometry.min_inlier_ratio");
+    EXPECT_EQ(row.In({3, 12})->default_value, "0.25");
+    EXPECT_EQ(row.In({5, 0})->default_value, "0");
+  }
+}
+
+TEST(Options, EverySpellingOfAnOptionMeansTheSame) {
+  for (const char* group : {"SiftMatching", "TwoViewGeometry", "FeatureMatching"}) {
+    const std::string prefix = std::string("--") + group;
+    const CommandLine line =
+        Parse({prefix + ".max_error", "3", prefix + ".max_ratio", "0.7", prefix + ".num_threads",
+               "2", prefix + ".use_gpu", "false", prefix + ".min_num_inliers", "20"});
+    EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "3")));
+    EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
+    EXPECT_EQ(line.pipeline.num_threads, 2);
+    EXPECT_FALSE(line.pipeline.verification.use_gpu);
+    EXPECT_EQ(line.pipeline.verification.min_num_inliers, 20);
+  }
+}
+
+TEST(Options, TwoSpellingsMustAgree) {
+  const std::vector<std::string> same = {"--SiftMatching.max_error", "4",
+                                         "--TwoViewGeometry.max_error", "4.0"};
+  EXPECT_EQ(ErrorOf(same), "no error");
+  EXPECT_THAT(ErrorOf({"--SiftMatching.max_error", "4", "--TwoViewGeometry.max_error", "5"}),
+              HasSubstr("--SiftMatching.max_error 4 and --TwoViewGeometry.max_error 5 are the same"));
+  EXPECT_THAT(ErrorOf({"--random_seed", "1", "--default_random_seed", "2"}),
+              HasSubstr("are the same option with different values"));
+  EXPECT_THAT(
+      ErrorOf({"--VocabTreeMatching.num_images", "50", "--GraphMatching.max_num_neighbors", "60"}),
+      HasSubstr("are the same option with different values"));
+  EXPECT_EQ(ErrorOf({"--SiftMatching.use_gpu", "0", "--FeatureMatching.use_gpu", "false"}),
+            "no error");
+}
+
+TEST(Options, OfTheVocabularyTreeThatHaveAMeaningHere) {
+  const CommandLine line = Parse({"--VocabTreeMatching.num_images", "50",
+                                  "--VocabTreeMatching.match_list_path", "images.txt"});
+  EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 50);
+  EXPECT_EQ(line.pipeline.image_list_path, "images.txt");
+  EXPECT_THAT(line.unused_options, IsEmpty());
+  EXPECT_THAT(ErrorOf({"--VocabTreeMatching.match_list_path", "a", "--GraphMatching.match_list_path",
+                       "b"}),
+              HasSubstr("give one of them"));
+}
+
+TEST(Options, WithoutMeaningAreSaidOnce) {
+  const CommandLine line = Parse({"--VocabTreeMatching.vocab_tree_path", "tree.bin",
+                                  "--VocabTreeMatching.num_checks", "64", "--log_level", "0"});
+  EXPECT_THAT(line.unused_options,
+              ElementsAre(HasSubstr("--VocabTreeMatching.vocab_tree_path has no effect here: there is"),
+                          HasSubstr("num_checks"), HasSubstr("log_level")));
+}
+
+TEST(Options, SeedsReachColmapToo) {
+  EXPECT_THAT(Parse({}).pipeline.verification.colmap_options, IsEmpty());
+  const CommandLine line = Parse({"--random_seed", "3"});
+  EXPECT_EQ(line.pipeline.seed, 3U);
+  EXPECT_THAT(line.pipeline.verification.colmap_options,
+              ElementsAre(Pair("default_random_seed", "3")));
+  EXPECT_THAT(ErrorOf({"--random_seed", "-1"}), HasSubstr("an integer of at least 0"));
+}
+
+TEST(Options, LightGlueIsColmaps) {
+  EXPECT_EQ(Parse({"--FeatureMatching.type", "SIFT_BRUTEFORCE"}).pipeline.verification.matcher,
+            ColmapVerifierOptions::Matcher::kAuto);
+  const CommandLine line = Parse({"--FeatureMatching.type", "SIFT_LIGHTGLUE"});
+  EXPECT_EQ(line.pipeline.verification.matcher, ColmapVerifierOptions::Matcher::kColmap);
+  EXPECT_THAT(line.pipeline.verification.colmap_options, Contains(Pair("type", "SIFT_LIGHTGLUE")));
+  EXPECT_THAT(
+      ErrorOf({"--FeatureMatching.type", "SIFT_LIGHTGLUE", "--GraphMatching.matcher", "exact"}),
+      HasSubstr("contradict"));
+  EXPECT_THAT(ErrorOf({"--FeatureMatching.type", "ALIKED_BRUTEFORCE"}),
+              HasSubstr("only SIFT features are matched"));
+}
+
+TEST(Options, TheNearestNameIsSuggested) {
+  EXPECT_THAT(ErrorOf({"--SiftMatching.maxratio", "0.8"}),
+              HasSubstr("Did you mean --SiftMatching.max_ratio?"));
+  EXPECT_THAT(ErrorOf({"--GraphMatching.max_neighbors", "8"}),
+              HasSubstr("Did you mean --GraphMatching.max_num_neighbors?"));
+}
+
+TEST(Options, ErrorsNameTheOptionAsItWasGiven) {
+  EXPECT_EQ(ErrorOf({"--FeatureMatching.max_ratio", "zero"}),
+            "--FeatureMatching.max_ratio is \"zero\"; it must be a number greater than 0.");
+  EXPECT_EQ(ErrorOf({"--GraphMatching.strategy", "x"}),
+            "--GraphMatching.strategy is \"x\"; it must be one of exhaustive, graphmatch.");
+  EXPECT_THAT(ErrorOf({"--GraphMatching.strategy"}), HasSubstr("GraphMatching.strategy"));
+  EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("\"stray\" on the command line belongs to no option"));
+}
+
+class ProjectTest : public ::testing::Test {
+ protected:
+  std::vector<std::string> Project(const std::string& text) {
+    const std::filesystem::path path = directory_.Path() / "project.ini";
+    std::ofstream(path) << text;
+    return {"--project_path", path.string()};
+  }
+
+  TestDirectory directory_;
+};
+
+TEST_F(ProjectTest, TheCommandLineGoesBeforeInAnySpelling) {
+  std::vector<std::string> arguments = Project(
+      "[SiftMatching]\nmax_error=3\nmax_ratio=0.7\n[VocabTreeMatching]\nnum_images=30\n"
+      "vocab_tree_path=\n[Mapper]\nmin_num_matches=x\n");
+  CommandLine line = Parse(arguments);
+  EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "3")));
+  EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 30);
+  arguments.insert(arguments.end(), {"--TwoViewGeometry.max_error", "5",
+                                     "--GraphMatching.max_num_neighbors", "40"});
+  line = Parse(arguments);
+  EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "5")));
+  EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 40);
+  EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
+}
+
+TEST_F(ProjectTest, DefaultsWithoutMeaningAreNotMentioned) {
+  EXPECT_THAT(Parse(Project("log_to_stderr=false\nlog_level=2\n[VocabTreeMatching]\nnum_checks=64\n"))
+                  .unused_options,
+              IsEmpty());
+  EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_checks=65\n")).unused_options,
+              ElementsAre(HasSubstr("num_checks")));
+}
+
+TEST_F(ProjectTest, ErrorsNameTheFile) {
+  EXPECT_THAT(ErrorOf(Project("[SiftMatching]\nmax_ratio=x\n")), HasSubstr("project.ini is \"x\""));
+  EXPECT_THAT(ErrorOf(Project("[SiftMatching\n")), HasSubstr("is no ini file"));
+  EXPECT_THAT(ErrorOf(Project("[GraphMatching]\nstrateg=exhaustive\n")),
+              HasSubstr("unknown option GraphMatching.strateg. Did you mean --GraphMatching.strategy?"));
+  EXPECT_THAT(ErrorOf(Project("[SiftMatching]\nmax_error=1\n[TwoViewGeometry]\nmax_error=2\n")),
+              HasSubstr("are the same option with different values"));
+  EXPECT_THAT(ErrorOf({"--project_path", directory_.Path().string()}), HasSubstr("Cannot read"));
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch

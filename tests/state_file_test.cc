@@ -1,0 +1,195 @@
+#include "colmap_graphmatch/database/state_file.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/database.h"
+#include "tests/support/synthetic_database.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr std::size_t kDim = 5;
+
+class StateFileTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = directory_.Path() / "a database.db.graphmatch";
+    for (ImageId id = 1; id <= 3; ++id) images_.push_back({id, 1000 + id});
+    vectors_.resize(images_.size() * kDim);
+    std::iota(vectors_.begin(), vectors_.end(), 0.5F);
+  }
+
+  void WriteAll() {
+    StateFile state(path_, 1);
+    state.WriteMixture("key", {1, 2, 3});
+    state.WriteVectors(images_, kDim, vectors_.data());
+    state.WriteSeeds("run", {ImagePair(1, 2), ImagePair(2, 3)});
+  }
+
+  void Execute(const std::string& sql) const {
+    sqlite::Connection(path_, sqlite::Access::kReadWrite, 1).Execute(sql);
+  }
+
+  // What is found in the file by a new run.
+  struct Found {
+    bool mixture = false;
+    std::vector<bool> vectors;
+    std::size_t num_seeds = 0;
+  };
+  Found ReadAll() const {
+    StateFile state(path_, 1);
+    Found found;
+    found.mixture = state.ReadMixture("key").has_value();
+    std::vector<float> vectors(vectors_.size());
+    found.vectors = state.ReadVectors(images_, kDim, vectors.data());
+    for (std::size_t i = 0; i < vectors.size(); ++i) {
+      EXPECT_EQ(vectors[i], found.vectors[i / kDim] ? vectors_[i] : 0);
+    }
+    found.num_seeds = state.ReadSeeds("run").size();
+    return found;
+  }
+
+  TestDirectory directory_;
+  std::filesystem::path path_;
+  std::vector<ImageFingerprint> images_;
+  std::vector<float> vectors_;
+};
+
+TEST_F(StateFileTest, KeepsWhatItIsGiven) {
+  WriteAll();
+  const Found found = ReadAll();
+  EXPECT_TRUE(found.mixture);
+  EXPECT_THAT(found.vectors, ElementsAre(true, true, true));
+  StateFile state(path_, 1);
+  EXPECT_EQ(*state.ReadMixture("key"), (sqlite::Blob{1, 2, 3}));
+  EXPECT_THAT(state.ReadSeeds("run"), ElementsAre(ImagePair(1, 2), ImagePair(2, 3)));
+  EXPECT_EQ(state.CountVectors(images_), 3U);
+}
+
+TEST_F(StateFileTest, GivesNothingForOtherKeysOrFeatures) {
+  WriteAll();
+  StateFile state(path_, 1);
+  EXPECT_FALSE(state.ReadMixture("another").has_value());
+  EXPECT_THAT(state.ReadSeeds("another"), IsEmpty());
+  images_[1].features += 1;
+  EXPECT_EQ(state.CountVectors(images_), 2U);
+  std::vector<float> vectors(vectors_.size());
+  EXPECT_THAT(state.ReadVectors(images_, kDim, vectors.data()), ElementsAre(true, false, true));
+  EXPECT_THAT(state.ReadVectors(images_, kDim - 1, vectors.data()),
+              ElementsAre(false, false, false));
+}
+
+TEST_F(StateFileTest, ANewMixtureDropsTheVectorsOfTheOldOne) {
+  WriteAll();
+  { StateFile(path_, 1).WriteMixture("key", {4}); }
+  EXPECT_THAT(ReadAll().vectors, ElementsAre(false, false, false));
+}
+
+TEST_F(StateFileTest, DamagedRowsAreAsIfTheyWereNotThere) {
+  WriteAll();
+  Execute("UPDATE vectors SET data = zeroblob(length(data)) WHERE image_id = 2");
+  Execute("UPDATE mixture SET data = x'010204'");
+  const Found found = ReadAll();
+  EXPECT_FALSE(found.mixture);
+  EXPECT_THAT(found.vectors, ElementsAre(true, false, true));
+  EXPECT_EQ(found.num_seeds, 2U);
+}
+
+TEST_F(StateFileTest, OfAnotherVersionOrWithoutItsTablesItIsMadeAnew) {
+  for (const char* damage : {"PRAGMA user_version = 999", "DROP TABLE vectors"}) {
+    WriteAll();
+    Execute(damage);
+    EXPECT_EQ(ReadAll().num_seeds, 0U) << damage;
+    WriteAll();
+    EXPECT_EQ(ReadAll().num_seeds, 2U) << damage;
+  }
+}
+
+TEST_F(StateFileTest, WithDamagedPagesItIsMadeAnewOrReadAsFarAsItIsWhole) {
+  WriteAll();
+  const auto size = static_cast<std::streamoff>(std::filesystem::file_size(path_));
+  std::string whole(static_cast<std::size_t>(size), '\0');
+  std::ifstream(path_, std::ios::binary).read(whole.data(), size);
+  for (std::streamoff offset = 100; offset < size; offset += 997) {
+    std::ofstream file(path_, std::ios::binary);
+    file.write(whole.data(), size);
+    file.seekp(offset);
+    file.write("\xFF\xFF\xFF\xFF", 4);
+    file.close();
+    ReadAll();
+    WriteAll();
+    EXPECT_THAT(ReadAll().vectors, ElementsAre(true, true, true));
+  }
+}
+
+TEST_F(StateFileTest, WhatIsNotItsOwnIsLeftAlone) {
+  std::ofstream(path_) << "a letter to my grandmother, longer than the header of a database: "
+                       << std::string(200, 'x');
+  EXPECT_THROW(StateFile(path_, 1), DatabaseError);
+  std::filesystem::remove(path_);
+  WriteSyntheticDatabase(path_, Schema::kColmap38, MakePlaces(1, 2, 5, 1));
+  try {
+    const StateFile state(path_, 1);
+    FAIL() << "another database was taken";
+  } catch (const DatabaseError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("is in the way"));
+  }
+  EXPECT_EQ(Database(path_, sqlite::Access::kRead, 1).ReadImages().size(), 2U);
+}
+
+TEST_F(StateFileTest, OnlyOneRunHasIt) {
+  const StateFile state(path_, 1);
+  try {
+    const StateFile second(path_, 0.05);
+    FAIL() << "two runs at once";
+  } catch (const DatabaseLockedError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("Another graphmatch_matcher works on this database"));
+  }
+}
+
+TEST_F(StateFileTest, BelongsToTheDatabaseWhateverItsName) {
+  const std::filesystem::path database = directory_.Path() / "d.db";
+  WriteSyntheticDatabase(database, Schema::kColmap38, MakePlaces(1, 2, 5, 1));
+  const std::filesystem::path link = directory_.Path() / "link.db";
+  std::filesystem::create_symlink(database, link);
+  EXPECT_EQ(StateFile::PathFor(link), StateFile::PathFor(database));
+}
+
+TEST(Fingerprints, ChangeWithTheFeatures) {
+  TestDirectory directory;
+  const std::filesystem::path path = directory.Path() / "d.db";
+  WriteSyntheticDatabase(path, Schema::kColmap42, MakePlaces(1, 4, 40, 1));
+  const auto read = [&] {
+    Database database(path, sqlite::Access::kRead, 1);
+    return database.ReadFingerprints(database.ReadImages());
+  };
+  const std::vector<ImageFingerprint> before = read();
+  ASSERT_EQ(before.size(), 4U);
+  EXPECT_NE(before[0].features, before[1].features);
+  sqlite::Connection connection(path, sqlite::Access::kReadWrite, 1);
+  // Image 2 gets the features of image 1, image 3 loses them, image 4 gets other keypoints.
+  connection.Execute("UPDATE descriptors SET data = (SELECT data FROM descriptors WHERE image_id = 1) "
+                     "WHERE image_id = 2");
+  connection.Execute("UPDATE descriptors SET rows = 0, data = NULL WHERE image_id = 3");
+  connection.Execute("UPDATE keypoints SET data = zeroblob(length(data)) WHERE image_id = 4");
+  const std::vector<ImageFingerprint> after = read();
+  ASSERT_EQ(after.size(), 3U);
+  EXPECT_EQ(after[0].features, before[0].features);
+  EXPECT_NE(after[1].features, before[1].features);
+  EXPECT_EQ(after[2].id, 4U);
+  EXPECT_NE(after[2].features, before[3].features);
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch
