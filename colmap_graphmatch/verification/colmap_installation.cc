@@ -1,9 +1,12 @@
 #include "colmap_graphmatch/verification/colmap_installation.h"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <boost/process/search_path.hpp>
+#include <cstddef>
 #include <deque>
 #include <fstream>
-#include <iterator>
 #include <regex>
 #include <utility>
 
@@ -18,6 +21,12 @@ constexpr std::pair<int, int> kOldestVersion(3, 8);
 // A COLMAP that does not even print its help within this time hangs.
 constexpr double kHelpTimeoutSeconds = 60;
 
+// What is looked at of a program's help (COLMAP's has some 10 KB), of the end of its output, and of
+// a line of that: a program that is not COLMAP, or a COLMAP that is broken, may print anything.
+constexpr std::size_t kMaxHelpBytes = 1 << 20;
+constexpr std::streamoff kMaxOutputBytes = 16 << 10;
+constexpr std::size_t kMaxLineBytes = 300;
+
 std::filesystem::path FindExecutable(const std::string& colmap_path) {
   const bool is_name = colmap_path.find('/') == std::string::npos;
   std::filesystem::path found = is_name ? boost::process::search_path(colmap_path).string()
@@ -29,6 +38,15 @@ std::filesystem::path FindExecutable(const std::string& colmap_path) {
                       ". Install COLMAP (Debian: apt-get install colmap) or say where it is with "
                       "--colmap_path.");
   }
+  if (std::filesystem::is_directory(found, error)) {
+    throw ColmapError(found.string() +
+                      " is a directory. Name the program in it with --colmap_path.");
+  }
+  if (::access(found.c_str(), X_OK) != 0) {
+    throw ColmapError(found.string() +
+                      " may not be executed. Give it the right with chmod +x, or name another "
+                      "program with --colmap_path.");
+  }
   return found;
 }
 
@@ -38,12 +56,16 @@ std::string Output(const std::vector<std::string>& command, const std::filesyste
       RunSubprocess(command, path, kHelpTimeoutSeconds, [&stop] { return stop.Requested(); });
   stop.ThrowIfRequested();
   if (!result.Succeeded()) {
-    throw ColmapError(command[0] + " " + command[1] + " " + result.Describe() + ":\n" +
-                      LastLines(path, 5) +
+    const std::string lines = LastLines(path, 5);
+    throw ColmapError("`" + command[0] + " " + command[1] + "` " + result.Describe() +
+                      (lines.empty() ? "." : ":\n" + lines) +
                       "\nThis program does not work as a COLMAP; name another with --colmap_path.");
   }
   std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  std::string output(kMaxHelpBytes, '\0');
+  file.read(output.data(), static_cast<std::streamsize>(output.size()));
+  output.resize(static_cast<std::size_t>(file.gcount()));
+  return output;
 }
 
 }  // namespace
@@ -88,7 +110,8 @@ ColmapInstallation DetectColmap(const std::string& colmap_path,
   const std::string executable = colmap.executable.string();
   const std::string help = Output({executable, "help"}, work_path / "help.txt", stop);
 
-  static const std::regex kVersion(R"(COLMAP (\d+)\.(\d+)(?:\.(\d+))?)");
+  // Every repetition has a limit: std::regex needs stack for each letter that one matches.
+  static const std::regex kVersion(R"(COLMAP (\d{1,4})\.(\d{1,4})(?:\.(\d{1,4}))?)");
   std::smatch version;
   if (!std::regex_search(help, version, kVersion)) {
     throw ColmapError(executable +
@@ -108,7 +131,7 @@ ColmapInstallation DetectColmap(const std::string& colmap_path,
 
   const std::string options =
       Output({executable, "matches_importer", "-h"}, work_path / "options.txt", stop);
-  static const std::regex kOption(R"(--([A-Za-z_]+(?:\.[A-Za-z0-9_]+)?))");
+  static const std::regex kOption(R"(--([A-Za-z_]{1,50}(?:\.[A-Za-z0-9_]{1,50})?))");
   for (std::sregex_iterator match(options.begin(), options.end(), kOption), end; match != end;
        ++match) {
     colmap.matcher_options.insert((*match)[1]);
@@ -118,9 +141,13 @@ ColmapInstallation DetectColmap(const std::string& colmap_path,
 
 std::string LastLines(const std::filesystem::path& output_path, std::size_t num_lines) {
   std::ifstream file(output_path);
+  file.seekg(0, std::ios::end);
+  file.seekg(
+      std::max<std::streamoff>(0, static_cast<std::streamoff>(file.tellg()) - kMaxOutputBytes));
   std::deque<std::string> lines;
   for (std::string line; std::getline(file, line);) {
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    if (line.size() > kMaxLineBytes) line = line.substr(0, kMaxLineBytes) + " ...";
     lines.push_back(line);
     if (lines.size() > num_lines) lines.pop_front();
   }

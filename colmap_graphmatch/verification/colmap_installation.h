@@ -41,7 +41,7 @@ struct ColmapInstallation {
 ColmapInstallation DetectColmap(const std::string& colmap_path,
                                 const std::filesystem::path& work_path, const StopRequest& stop);
 
-// The end of a program's output, for an error message.
+// The end of a program's output, for an error message: long lines are cut, empty ones left out.
 std::string LastLines(const std::filesystem::path& output_path, std::size_t num_lines);
 
 }  // namespace colmap_graphmatch

@@ -68,7 +68,9 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
       });
   lock.unlock();
   if (error) {
-    throw ColmapError("Cannot start " + command.front() + ": " + error.message() + ".");
+    throw ColmapError("Cannot start " + command.front() + ": " + error.message() +
+                      ". If it is not a program that runs on this machine, name another with "
+                      "--colmap_path.");
   }
 
   SubprocessResult result;
