@@ -12,6 +12,7 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/verification/subprocess.h"
+#include "colmap_graphmatch/verification/work_directory.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -55,6 +56,8 @@ std::string Output(const std::vector<std::string>& command, const std::filesyste
   const SubprocessResult result =
       RunSubprocess(command, path, kHelpTimeoutSeconds, [&stop] { return stop.Requested(); });
   stop.ThrowIfRequested();
+  // Even after success: help that is cut off would seem to lack options.
+  ThrowIfDiskIsFull(path.parent_path());
   if (!result.Succeeded()) {
     const std::string lines = LastLines(path, 5);
     throw ColmapError("`" + command[0] + " " + command[1] + "` " + result.Describe() +

@@ -37,7 +37,8 @@ struct ColmapInstallation {
 
 // Asks the program what it is. colmap_path: a path, or a name to be found on PATH. work_path: a
 // directory for what it prints. Throws ColmapError if there is no such program, or if it is not
-// COLMAP 3.8 or later; StoppedError if stop asks for it.
+// COLMAP 3.8 or later; FileError if the disk of work_path is full; StoppedError if stop asks for
+// it.
 ColmapInstallation DetectColmap(const std::string& colmap_path,
                                 const std::filesystem::path& work_path, const StopRequest& stop);
 

@@ -47,9 +47,6 @@ constexpr std::size_t kMaxUnrelatedFailures = 4;
 constexpr double kPatience = 20;
 constexpr double kMinTimeoutSeconds = 30;
 
-// Less free space than this in the working directory explains any failure of COLMAP.
-constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
-
 // Pairs that share images come into the same shard, and shards that do follow each other.
 std::vector<std::vector<ImagePair>> CutIntoShards(std::vector<ImagePair> pairs,
                                                   std::size_t min_pairs_per_shard,
@@ -187,19 +184,11 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
       output_path, kMinTimeoutSeconds, [&stop] { return stop.Requested(); });
   stop.ThrowIfRequested();
   if (!result.Succeeded() || !std::filesystem::exists(template_path_)) {
+    ThrowIfDiskIsFull(work_path);
     throw ColmapError("`" + colmap.executable.string() + " database_creator` " + result.Describe() +
                       " and made no database in " + work_path.string() + ":\n" +
                       LastLines(output_path, 5));
   }
-}
-
-void ColmapVerifier::ThrowIfDiskIsFull() const {
-  std::error_code error;
-  const std::filesystem::space_info space = std::filesystem::space(work_path_, error);
-  if (error || space.available >= kMinFreeBytes) return;
-  throw FileError("The disk of the working directory " + work_path_.string() +
-                  " is full. Free some space or name another directory with "
-                  "--GraphMatching.work_path; run the same command again to go on.");
 }
 
 void ColmapVerifier::CheckThatColmapWorks(const std::vector<PairRows>& results,
@@ -299,10 +288,11 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
     FillShard(database_path, database_.Path(), options_.lock_timeout, pairs,
               shards_with_descriptors_);
   } catch (const std::filesystem::filesystem_error& error) {
+    ThrowIfDiskIsFull(work_path_);
     throw FileError("Cannot make a shard in the working directory: " + std::string(error.what()) +
                     ". Name another directory with --GraphMatching.work_path.");
   } catch (const DatabaseError&) {
-    ThrowIfDiskIsFull();
+    ThrowIfDiskIsFull(work_path_);
     throw;
   }
   std::ofstream list(list_path);
@@ -310,6 +300,7 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
     list << ShardImageName(pair.id1) << ' ' << ShardImageName(pair.id2) << '\n';
   }
   list.close();
+  if (!list) ThrowIfDiskIsFull(work_path_);
   if (!list) throw FileError("Cannot write " + list_path.string() + ". Is the disk full?");
 
   std::vector<std::string> command = {
@@ -341,7 +332,7 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
     }
   }
   if (!problem.empty()) {
-    ThrowIfDiskIsFull();
+    ThrowIfDiskIsFull(work_path_);
     return problem;
   }
   const std::lock_guard<std::mutex> lock(batch->mutex);

@@ -120,7 +120,6 @@ class ColmapVerifier : public PairVerifier {
   // One run of COLMAP on the pairs. An empty string if it went well; otherwise what went wrong.
   std::string TryShard(const std::vector<ShardPair>& pairs, Batch* batch,
                        std::vector<PairRows>* results);
-  void ThrowIfDiskIsFull() const;
   void WarnOfCutFeatures(const std::vector<ImageRecord>& images) const;
   // Throws ColmapError once COLMAP has failed on pairs that have nothing in common.
   void CheckThatColmapWorks(const std::vector<PairRows>& results,

@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
@@ -19,6 +20,9 @@
 
 namespace colmap_graphmatch {
 namespace {
+
+// Less free space than this explains any failure of COLMAP.
+constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
 
 // What the guard does, with standard input as its end of the pipe. Between fork and exec of a
 // process with threads only calls that are safe in signal handlers are allowed.
@@ -58,9 +62,10 @@ std::string RandomName() {
 
 WorkDirectory::WorkDirectory(const std::filesystem::path& parent, Guard guard) {
   const char* variable = std::getenv("TMPDIR");
-  const std::filesystem::path base = !parent.empty()       ? parent
-                                     : variable != nullptr ? std::filesystem::path(variable)
-                                                           : "/tmp";
+  const bool is_set = variable != nullptr && *variable != '\0';
+  const std::filesystem::path base = !parent.empty() ? parent
+                                     : is_set        ? std::filesystem::path(variable)
+                                                     : "/tmp";
   path_ = std::filesystem::absolute(base) / ("graphmatch-" + RandomName());
   // First, so that there is no moment at which the directory is there and the guard is not.
   if (guard == Guard::kGuarded) StartGuard();
@@ -100,6 +105,15 @@ void WorkDirectory::DismissGuard() {
   ::close(guard_pipe_);
   guard_pipe_ = -1;
   if (told && guard_ > 0) ::waitpid(guard_, nullptr, 0);
+}
+
+void ThrowIfDiskIsFull(const std::filesystem::path& work_path) {
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(work_path, error);
+  if (error || space.available >= kMinFreeBytes) return;
+  throw FileError("The disk of the working directory " + work_path.string() +
+                  " is full: less than 16 MB are free. Free some space or name another directory "
+                  "with --GraphMatching.work_path; run the same command again to go on.");
 }
 
 }  // namespace colmap_graphmatch

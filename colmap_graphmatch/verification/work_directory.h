@@ -13,7 +13,8 @@ class WorkDirectory {
   // after kill -9.
   enum class Guard { kUnguarded, kGuarded };
 
-  // parent: where to make it; empty: $TMPDIR, or /tmp. Throws FileError.
+  // parent: where to make it; empty: $TMPDIR, or /tmp if that is not set or empty. Throws
+  // FileError.
   explicit WorkDirectory(const std::filesystem::path& parent, Guard guard = Guard::kUnguarded);
   ~WorkDirectory();
   WorkDirectory(const WorkDirectory&) = delete;
@@ -29,5 +30,9 @@ class WorkDirectory {
   int guard_pipe_ = -1;  // The guard acts when this end is closed without a word.
   pid_t guard_ = -1;
 };
+
+// Throws FileError if the disk of a working directory is full, or all but full: whatever has failed
+// in it, or seems to have succeeded, cannot be trusted then.
+void ThrowIfDiskIsFull(const std::filesystem::path& work_path);
 
 }  // namespace colmap_graphmatch
