@@ -19,15 +19,15 @@ struct Line {
   std::string text;
 };
 
-std::vector<Line> ReadLines(const std::filesystem::path& path, const std::string& kind) {
+// kind and content say in errors what the list is.
+std::vector<Line> ReadLines(const std::filesystem::path& path, const std::string& kind,
+                            const std::string& content) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
-    throw FileError("The list of " + kind + " " + path.string() + " is a directory.");
-  }
   std::ifstream file(path);
-  if (!file) {
+  const int reason = errno;
+  if (!file || std::filesystem::is_directory(path, ignored)) {
     throw FileError("Cannot read the list of " + kind + " " + path.string() + ": " +
-                    std::strerror(errno) + ".");
+                    std::strerror(file ? EISDIR : reason) + ". Give a file with " + content + ".");
   }
   std::vector<Line> lines;
   std::size_t number = 0;
@@ -58,7 +58,7 @@ std::unordered_map<std::string, ImageId> IdsByName(const std::vector<ImageRecord
 PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
   const std::unordered_map<std::string, ImageId> ids = IdsByName(images);
   PairList list;
-  for (const auto& [line_number, line] : ReadLines(path, "image pairs")) {
+  for (const auto& [line_number, line] : ReadLines(path, "image pairs", "two image names a line")) {
     // Every way to cut it into a name, another, and what may follow, e.g. a score.
     const char separator = line.find('\t') != std::string::npos ? '\t' : ' ';
     std::vector<std::size_t> cuts;
@@ -101,7 +101,7 @@ PairList ReadPairList(const std::filesystem::path& path, const std::vector<Image
 ImageList ReadImageList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
   const std::unordered_map<std::string, ImageId> ids = IdsByName(images);
   ImageList list;
-  for (const Line& line : ReadLines(path, "images")) {
+  for (const Line& line : ReadLines(path, "images", "an image name a line")) {
     const auto found = ids.find(line.text);
     if (found != ids.end()) {
       list.images.push_back(found->second);

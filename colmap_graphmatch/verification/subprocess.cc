@@ -23,6 +23,12 @@ namespace bp = boost::process;
 // Between two looks at the program. Short against the start-up of COLMAP (25 ms).
 constexpr std::chrono::milliseconds kPollInterval(4);
 
+std::string Rounded(double seconds) {
+  std::string text = std::to_string(seconds);
+  text.resize(text.find('.') + 2);
+  return text;
+}
+
 }  // namespace
 
 std::string SubprocessResult::Describe() const {
@@ -30,8 +36,7 @@ std::string SubprocessResult::Describe() const {
     case Ending::kSignal:
       return "was killed by signal " + std::to_string(signal) + " (" + ::strsignal(signal) + ")";
     case Ending::kTimedOut:
-      return "did not finish within " + std::to_string(static_cast<long>(seconds)) +
-             " s and was killed";
+      return "did not finish within " + Rounded(seconds) + " s and was killed";
     case Ending::kStopped:
       return "was stopped";
     case Ending::kExited:
