@@ -1,7 +1,9 @@
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <iostream>
 #include <new>
@@ -43,6 +45,14 @@ void InstallSignalHandlers() {
   std::signal(SIGPIPE, SIG_IGN);
 }
 
+// Results are in the database, and a full disk under the standard output changes nothing about
+// that: no reason for another exit code, but for a word.
+void WarnIfNotWritten(const std::ostream& stream) {
+  if (stream) return;
+  std::cerr << "Warning: The standard output could not be written: " << std::strerror(errno)
+            << ". Nothing else is lost." << std::endl;
+}
+
 int Run(const CommandLine& line) {
   InstallSignalHandlers();
   Console console(stderr);
@@ -51,6 +61,7 @@ int Run(const CommandLine& line) {
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
     console.ClearProgress();
     std::cout << FormatSummary(result) << std::flush;
+    WarnIfNotWritten(std::cout);
     if (result.matching.finished) return kExitSuccess;
   } catch (const StoppedError&) {
     // Before the first pair: there is nothing to sum up.
@@ -70,10 +81,12 @@ int Main(int argc, const char* const* argv) {
     const CommandLine line = ParseCommandLine(argc, argv);
     if (line.help) {
       PrintHelp(std::cout);
+      WarnIfNotWritten(std::cout.flush());
       return kExitSuccess;
     }
     if (line.version) {
       std::cout << "graphmatch_matcher " << kVersion << std::endl;
+      WarnIfNotWritten(std::cout);
       return kExitSuccess;
     }
     return Run(line);
