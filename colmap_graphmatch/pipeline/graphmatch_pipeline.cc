@@ -228,6 +228,9 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
                        std::to_string(all_images.size()) +
                        " images have no features and cannot be matched.");
   }
+  if (images.size() == 1) {
+    observer.OnWarning("Only one image has features: there is no pair to test.");
+  }
 
   const bool from_list = !options.match_list_path.empty();
   std::vector<ImagePair> listed_pairs;
