@@ -3,7 +3,9 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
+#include <system_error>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/database/lock_holder.h"
@@ -24,6 +26,15 @@ std::string ReadOnlyUri(const std::filesystem::path& path) {
     }
   }
   return uri + "?mode=ro";
+}
+
+// Whether the disk of a file has no room for the -shm file that SQLite makes, even to read, in
+// write-ahead mode.
+bool DiskIsFull(const std::filesystem::path& path) {
+  constexpr std::uintmax_t kShmBytes = 32768;
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(path, error);
+  return !error && space.available < kShmBytes;
 }
 
 std::string Seconds(double seconds) {
@@ -84,7 +95,9 @@ void Connection::Throw(const std::string& doing) const {
   const int code = db_ ? sqlite3_extended_errcode(db_.get()) : SQLITE_NOMEM;
   const std::string detail = db_ ? sqlite3_errmsg(db_.get()) : "out of memory";
   const std::string what = "Cannot " + doing + " in " + path_.string() + ": ";
-  switch (code & 0xFF) {
+  // Of that full disk SQLite only says "disk I/O error".
+  const bool disk_is_full = (code & 0xFF) == SQLITE_IOERR && DiskIsFull(path_);
+  switch (disk_is_full ? SQLITE_FULL : code & 0xFF) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       throw DatabaseLockedError(what + "another process kept it locked for " +
