@@ -185,9 +185,11 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
   stop.ThrowIfRequested();
   if (!result.Succeeded() || !std::filesystem::exists(template_path_)) {
     ThrowIfDiskIsFull(work_path);
+    const std::string lines = LastLines(output_path, 5);
     throw ColmapError("`" + colmap.executable.string() + " database_creator` " + result.Describe() +
-                      " and made no database in " + work_path.string() + ":\n" +
-                      LastLines(output_path, 5));
+                      " and made no database in " + work_path.string() + ".\n" + lines +
+                      (lines.empty() ? "" : "\n") +
+                      "This COLMAP does not work; name another with --colmap_path.");
   }
 }
 
