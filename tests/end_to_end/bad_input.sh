@@ -26,7 +26,7 @@ fake=$build/tests/fake_colmap
 document=$root/docs/errors.md
 export TMPDIR=$work/tmp
 place=$work/place     # The directory of the database.
-here=$work/here       # Where the program is started; nothing of it belongs there.
+here=$work/here       # Where the program is started; it has no business there.
 disk=$work/disk       # Where disks are mounted.
 mkdir -p "$TMPDIR" "$here" "$disk" "$work/programs" "$work/tables"
 cd "$here"
@@ -70,7 +70,7 @@ snapshot() {
   grep -a -v -E "$pairs_pattern" "$work/contents.$1" >"$work/others.$1" || true
   grep -a -E "$pairs_pattern" "$work/contents.$1" | LC_ALL=C sort >"$work/pairs.$1" || true
   # SQLite's own files beside the database are part of it.
-  { find "${database%/*}" "$TMPDIR" "$here" "$disk" 2>/dev/null || true; } |
+  { find "${database%/*}" "$disk" 2>/dev/null || true; } |
     grep -a -v -E -e '-(wal|shm|journal)$' | LC_ALL=C sort >"$work/files.$1"
 }
 
@@ -127,6 +127,7 @@ says() {
   [[ $code == "$expected" ]] || { tail -n 20 "$work/output.txt"; fail "$what: exit code $code, not $expected"; }
   diff "$work/others.before" "$work/others.after" >&2 || fail "$what: the database has changed"
   diff "$work/files.before" "$work/files.after" >&2 || fail "$what: it left files, or took some away"
+  [[ -z $(ls -A "$TMPDIR") && -z $(ls -A "$here") ]] || fail "$what: files in $TMPDIR or $here"
   expect_no_processes "$what"
   if [[ $code == 0 || ${partial:-} == yes ]]; then
     [[ -z $(comm -23 "$work/pairs.before" "$work/pairs.after") ]] || fail "$what: pairs were lost"
