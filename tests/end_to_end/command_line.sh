@@ -75,7 +75,8 @@ echo "== A locked database"
 mkfifo "$work/hold"
 sqlite3 "$database" <"$work/hold" &
 exec 3>"$work/hold"
-echo 'BEGIN IMMEDIATE;' >&3
+# It waits for the loop below, whose tries take the lock for a moment.
+printf '%s\n' '.timeout 10000' 'BEGIN IMMEDIATE;' >&3
 for _ in {1..100}; do
   sqlite3 "$database" 'BEGIN IMMEDIATE' 2>/dev/null || break
   sleep 0.05
