@@ -263,6 +263,11 @@ INSTANTIATE_TEST_SUITE_P(
                    "the blob has 1280"},
         Corruption{"Float", "UPDATE descriptors SET data = zeroblob(5120)", "floating-point"},
         Corruption{"Dim", "UPDATE descriptors SET cols = 64, data = zeroblob(640)", "10 x 64"},
+        Corruption{"Text", "UPDATE descriptors SET data = CAST(zeroblob(1280) AS TEXT)",
+                   "the blob has 0"},
+        Corruption{"KeypointText",
+                   "UPDATE keypoints SET data = replace(hex(zeroblob(80)), '0', 'a')",
+                   "has 0 bytes"},
         Corruption{"KeypointRows", "UPDATE keypoints SET rows = 9", "10 descriptors but 9"},
         Corruption{"KeypointCols", "UPDATE keypoints SET cols = 5", "5 columns"},
         Corruption{"KeypointData", "UPDATE keypoints SET data = zeroblob(12)", "has 12 bytes"}),
@@ -282,16 +287,106 @@ TEST_F(DatabaseTest, ImageIdOutOfRange) {
   EXPECT_THAT(ReadImagesMessage(), HasSubstr("outside COLMAP's range"));
 }
 
+TEST_F(DatabaseTest, NamesLongerThanAnyPath) {
+  Write();
+  Execute("UPDATE images SET name = CAST(zeroblob(4096) AS TEXT) WHERE image_id = 2");
+  EXPECT_THAT(Open().ReadImages(), SizeIs(6));
+  Execute("UPDATE images SET name = CAST(zeroblob(4097) AS TEXT) WHERE image_id = 2");
+  EXPECT_THAT(ReadImagesMessage(), HasSubstr("id 2 has 4097 bytes"));
+}
+
+// What the program looks up by a key must have it: rows of the same image in three tables without
+// keys would be joined to their product.
+TEST_F(DatabaseTest, TablesWithoutKeys) {
+  for (const char* table : {"images", "keypoints", "two_view_geometries"}) {
+    std::filesystem::remove(Path());
+    Write();
+    Execute("CREATE TABLE copy AS SELECT * FROM " + std::string(table) + "; DROP TABLE " + table +
+            "; ALTER TABLE copy RENAME TO " + table);
+    EXPECT_THAT(MessageOf([this] { Open(); }),
+                AllOf(HasSubstr(table), HasSubstr("as its INTEGER PRIMARY KEY")));
+  }
+}
+
+// The rows of this one have no end.
+TEST_F(DatabaseTest, AViewInPlaceOfATable) {
+  Write();
+  Execute(
+      "DROP TABLE images; CREATE VIEW images AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT "
+      "i + 1 FROM n) SELECT i AS image_id, 'a' AS name, 1 AS camera_id FROM n");
+  EXPECT_THAT(MessageOf([this] { Open(); }), HasSubstr("its images is a view"));
+}
+
+TEST_F(DatabaseTest, NothingInTheFileIsRun) {
+  Write();
+  Execute(
+      "CREATE VIEW mine AS SELECT * FROM images; CREATE INDEX lower_names ON "
+      "images(lower(name)); CREATE TRIGGER harm AFTER INSERT ON two_view_geometries BEGIN DELETE "
+      "FROM images; END");
+  Database database = Open();
+  database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
+  EXPECT_THAT(database.ReadImages(), SizeIs(6));
+  sqlite::Connection connection(Path(), sqlite::Access::kRead, 1);
+  EXPECT_THAT(MessageOf([&] { sqlite::Statement(connection, "SELECT * FROM mine"); }),
+              HasSubstr("prohibited"));
+  EXPECT_THAT(
+      MessageOf([&] { connection.Execute("CREATE VIRTUAL TABLE temp.text USING fts4(text)"); }),
+      HasSubstr("no such module"));
+  EXPECT_THAT(MessageOf([&] {
+                Execute("PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = 'x'");
+              }),
+              HasSubstr("may not be modified"));
+  EXPECT_EQ(Query("PRAGMA trusted_schema"), 0);
+  EXPECT_EQ(Query("PRAGMA cell_size_check"), 1);
+}
+
+TEST_F(DatabaseTest, NothingIsComputedOnWriting) {
+  const std::string columns = "pair_id INTEGER PRIMARY KEY, rows, cols, data, config, F, E, H";
+  const auto message = [&](const std::string& rest) {
+    std::filesystem::remove(Path());
+    Write();
+    Execute("DROP TABLE two_view_geometries; CREATE TABLE two_view_geometries(" + columns + rest);
+    return MessageOf([this] { Open().WritePairs({MakeRows(ImagePair(1, 2), 20)}); });
+  };
+  for (const char* rest :
+       {", large AS (hex(zeroblob(400000000))))", ", large AS (hex(rows)) STORED)",
+        ", large DEFAULT (hex(zeroblob(400000000))))",
+        "); CREATE INDEX i ON two_view_geometries(hex(rows))",
+        "); CREATE INDEX i ON two_view_geometries(rows) WHERE hex(rows) > 7"}) {
+    EXPECT_THAT(message(rest), HasSubstr("its table two_view_geometries has generated columns"))
+        << rest;
+  }
+  EXPECT_EQ(message(", more DEFAULT 7, CHECK(hex(rows) = 'not so'))"), "");
+  EXPECT_EQ(message("); CREATE INDEX i ON two_view_geometries(config, rows)"), "");
+}
+
+TEST_F(DatabaseTest, StepsWithoutEnd) {
+  Write();
+  sqlite::Connection connection(Path(), sqlite::Access::kRead, 1);
+  sqlite::Statement endless(
+      connection,
+      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i FROM n WHERE i < "
+      "3 OR i < 0");
+  EXPECT_TRUE(endless.Step());
+  EXPECT_TRUE(endless.Step());
+  EXPECT_THAT(MessageOf([&] { endless.Step(); }), HasSubstr("does not come to an end"));
+  // What earlier steps took does not count.
+  sqlite::Statement slow(connection,
+                         "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i "
+                         "FROM n WHERE i % 800000 = 0 LIMIT 5");
+  int num = 0;
+  while (slow.Step()) ++num;
+  EXPECT_EQ(num, 5);
+}
+
 TEST_F(DatabaseTest, WritesAreRolledBackUnlessAllSucceed) {
   Write();
   Database database = Open();
-  Execute(
-      "CREATE TRIGGER refuse BEFORE INSERT ON two_view_geometries WHEN NEW.rows = 7 BEGIN "
-      "SELECT RAISE(ABORT, 'refused by the test'); END");
+  Execute("CREATE UNIQUE INDEX refuse_equal_rows ON two_view_geometries(rows)");
   EXPECT_THAT(MessageOf([&] {
-                database.WritePairs({MakeRows(ImagePair(1, 2), 20), MakeRows(ImagePair(1, 3), 7)});
+                database.WritePairs({MakeRows(ImagePair(1, 2), 20), MakeRows(ImagePair(1, 3), 20)});
               }),
-              HasSubstr("refused by the test"));
+              HasSubstr("UNIQUE constraint failed"));
   EXPECT_EQ(Query("SELECT count(*) FROM matches"), 0);
   EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 0);
   database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
@@ -312,8 +407,12 @@ TEST_F(DatabaseTest, TestedPairsAscendAndKeysOfNoPairAreLeftOut) {
   Write();
   Database database = Open();
   database.WritePairs({MakeRows(ImagePair(4, 5), 20), MakeRows(ImagePair(1, 2), 20)});
-  const std::vector<std::string> keys = {std::to_string(kMaxNumImages * 3 + 1), "-5", "7",
-                                         std::to_string(kMaxNumImages), "9223372036854775807"};
+  const std::vector<std::string> keys = {std::to_string(kMaxNumImages * 3 + 1),
+                                         "-5",
+                                         "7",
+                                         std::to_string(kMaxNumImages),
+                                         "9223372036854775807",
+                                         std::to_string(EncodePair({3, 4}) - 1)};
   for (const std::string& key : keys) {
     Execute("INSERT INTO two_view_geometries(pair_id, rows, cols, config) VALUES(" + key +
             ", 20, 2, 2)");
@@ -436,6 +535,27 @@ INSTANTIATE_TEST_SUITE_P(AcrossVersions, ShardTest,
                                            SchemaPair{Schema::kColmap42, Schema::kColmap38},
                                            SchemaPair{Schema::kColmap310, Schema::kColmap42},
                                            SchemaPair{Schema::kColmap42, Schema::kColmap42}));
+
+class ShardMatches : public DatabaseTest, public ::testing::WithParamInterface<const char*> {};
+
+// COLMAP would take them as they are.
+TEST_P(ShardMatches, ThatCannotBeAreRefused) {
+  Write();
+  Execute("INSERT INTO matches VALUES(" + std::to_string(EncodePair(ImagePair(2, 5))) + ", " +
+          GetParam() + ")");
+  const std::filesystem::path shard_path = directory_.Path() / "shard.db";
+  CreateColmapDatabase(shard_path, Schema::kColmap38);
+  EXPECT_THAT(MessageOf([&] {
+                FillShard(shard_path, Path(), kLockTimeout, {{ImagePair(2, 5), {}}}, false);
+              }),
+              AllOf(HasSubstr("ids 2 and 5"), HasSubstr("DELETE FROM matches")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Shards, ShardMatches,
+                         ::testing::Values("1, 2, x'0A00000000000000'", "1, 2, x'090000000A000000'",
+                                           "1, 2, x'FFFFFFFFFFFFFFFF'", "2, 2, zeroblob(8)",
+                                           "1, 1, zeroblob(8)", "2305843009213693952, 2, NULL",
+                                           "-1, 2, zeroblob(8)"));
 
 class ShardResults : public DatabaseTest {
  protected:

@@ -75,6 +75,17 @@ TEST_F(PairListTest, LinesThatNameNoPairAreCounted) {
   EXPECT_THROW(Read("a.jpg b.jpg"), FileError);
 }
 
+// As long as the longest two names, and far longer: the time must not grow with its square.
+TEST_F(PairListTest, LongLines) {
+  EXPECT_THAT(Read("my photo.jpg photo.jpg\nphoto.jpg my photo.jpg x\n").pairs,
+              ElementsAre(ImagePair(3, 4), ImagePair(3, 4)));
+  images_.push_back({6, "b.jpg my photo.jpg", 1});
+  EXPECT_THAT(Read("a.jpg\tb.jpg my photo.jpg\n").pairs, ElementsAre(ImagePair(1, 6)));
+  std::string words = "a.jpg b.jpg";
+  for (int i = 0; i < 8000000; ++i) words += " a";
+  EXPECT_THAT(Read(words).pairs, ElementsAre(ImagePair(1, 2)));
+}
+
 TEST_F(PairListTest, AFileThatIsNotThere) {
   EXPECT_THROW(ReadPairList("/nowhere/pairs.txt", images_), FileError);
   EXPECT_THROW(ReadPairList(directory_.Path(), images_), FileError);

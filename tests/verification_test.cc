@@ -589,6 +589,27 @@ TEST(Subprocess, ThatCannotStart) {
                ColmapError);
 }
 
+TEST_F(VerifierTest, NamesOfImagesReachNoShellAndNoListOfPairs) {
+  const std::string mark = (directory_.Path() / "mark").string();
+  std::vector<SyntheticImage> images = MakePlaces(1, 6, 30, 1);
+  const std::vector<std::string> names = {"$(touch '" + mark + "')",    "`touch '" + mark + "'`",
+                                          "'; touch '" + mark + "'; '", "| touch '" + mark + "' #",
+                                          "--help\ntouch mark",         "../../a b\t\x1B]0;c"};
+  for (std::size_t i = 0; i < images.size(); ++i) images[i].name = names[i];
+  std::filesystem::remove(database_path_);
+  WriteSyntheticDatabase(database_path_, Schema::kColmap38, images);
+  Set("FAKE_COLMAP_FAULT", "crash");
+  Set("FAKE_COLMAP_FAULT_PAIR", "1 2");
+  EXPECT_TRUE(Verify(AllPairs(6)));
+  EXPECT_EQ(CountInLog("pair 3 4"), 1U);
+  EXPECT_EQ(InDatabase().size(), 14U);
+  ASSERT_THAT(warnings_, SizeIs(1));
+  EXPECT_THAT(warnings_[0], HasSubstr(names[0]));
+  EXPECT_FALSE(std::filesystem::exists(mark));
+  EXPECT_GT(CountInLog("private directory"), 0U);
+  EXPECT_EQ(CountInLog("open directory"), 0U);
+}
+
 TEST(Subprocess, ArgumentsReachNoShell) {
   const TestDirectory directory;
   RunSubprocess({"/bin/echo", "$(touch x); `id` 'a b'"}, directory.Path() / "out.txt", 0, Never);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <boost/lexical_cast.hpp>
 #include <boost/program_options.hpp>
+#include <cctype>
+#include <cstdint>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -49,6 +51,27 @@ bool SameValue(const std::string& a, const std::string& b) {
   double number_b = 0;
   return boost::conversion::try_lexical_convert(a, number_a) &&
          boost::conversion::try_lexical_convert(b, number_b) && number_a == number_b;
+}
+
+// Boost puts names and values where its messages have %value% and the like, again and again: where
+// they contain that themselves, what() would never return. This takes such marks apart.
+class Substitutions : public po::error_with_option_name {
+ public:
+  static void TakeMarksApart(po::error_with_option_name* error) {
+    for (auto& [name, text] : error->*(&Substitutions::m_substitutions)) {
+      for (std::size_t i = text.find('%'); i != std::string::npos; i = text.find('%', i + 1)) {
+        if (i + 1 < text.size() && std::isalpha(static_cast<unsigned char>(text[i + 1])) != 0) {
+          text.insert(i + 1, " ");
+        }
+      }
+    }
+  }
+};
+
+std::string MessageOf(po::error* error) {
+  auto* with_name = dynamic_cast<po::error_with_option_name*>(error);
+  if (with_name != nullptr) Substitutions::TakeMarksApart(with_name);
+  return error->what();
 }
 
 class Parser {
@@ -105,10 +128,10 @@ class Parser {
     po::parsed_options parsed(&accepted_);
     try {
       parsed = po::parse_command_line(argc, argv, accepted_);
-    } catch (const po::unknown_option& error) {
-      throw OptionsError(std::string(error.what()) + ". " + Suggest(error.get_option_name()));
-    } catch (const po::error& error) {
-      throw OptionsError(std::string(error.what()) + ". " + kSeeHelp);
+    } catch (po::unknown_option& error) {
+      throw OptionsError(MessageOf(&error) + ". " + Suggest(error.get_option_name()));
+    } catch (po::error& error) {
+      throw OptionsError(MessageOf(&error) + ". " + kSeeHelp);
     }
     std::vector<Given> given;
     for (const po::option& option : parsed.options) {
@@ -139,9 +162,9 @@ class Parser {
     po::parsed_options parsed(&accepted_);
     try {
       parsed = po::parse_config_file(file, accepted_, true);
-    } catch (const po::error& error) {
+    } catch (po::error& error) {
       throw OptionsError("The project file " + path +
-                         " (--project_path) is no ini file: " + error.what() + ".");
+                         " (--project_path) is no ini file: " + MessageOf(&error) + ".");
     }
     std::vector<Given> given;
     for (const po::option& option : parsed.options) {

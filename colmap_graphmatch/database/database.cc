@@ -20,6 +20,12 @@ constexpr std::int64_t kFirstVersionWithNull = 3900;
 constexpr std::size_t kQvecColumn = 3;
 constexpr std::size_t kTvecColumn = 4;
 
+// Bytes of the longest path on Linux. Images are named by their paths.
+constexpr std::size_t kMaxNameLength = 4096;
+
+// COLMAP's keypoints with the most columns are affine frames.
+constexpr std::size_t kMaxKeypointCols = 6;
+
 // FeatureExtractorType::SIFT in COLMAP 4 (src/colmap/feature/types.h).
 constexpr std::int64_t kSiftType = 0;
 
@@ -66,7 +72,45 @@ bool AllZero(const sqlite::Blob& blob) {
 // False for keys that COLMAP never writes, e.g. with the larger id first: they name no pair.
 bool IsColmapsKey(PairId pair_id) {
   const ImagePair pair = DecodePair(pair_id);
-  return pair.id1 != 0 && EncodePair(pair) == pair_id;
+  return pair.id1 != 0 && pair.id1 != pair.id2 && EncodePair(pair) == pair_id;
+}
+
+// Notices a table whose rows do not come in the order of their keys: in a damaged file, the same
+// rows can come again and again, without end.
+class AscendingKeys {
+ public:
+  // False if the key is not greater than the one before.
+  bool Add(std::int64_t key) {
+    const bool ascends = first_ || key > last_;
+    first_ = false;
+    last_ = key;
+    return ascends;
+  }
+
+ private:
+  bool first_ = true;
+  std::int64_t last_ = 0;
+};
+
+std::int64_t NumBytes(sqlite::Connection& connection) {
+  sqlite::Statement size(connection,
+                         "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size");
+  size.Step();
+  return size.Int(0);
+}
+
+// True if SQLite would compute something when it writes a row into the table: generated columns,
+// defaults that are expressions, partial indexes and those on expressions. Any of them can take for
+// ever, and COLMAP's tables have none. (CHECK constraints are off: see sqlite.h.)
+bool ComputesOnWriting(sqlite::Connection& connection, const std::string& table) {
+  sqlite::Statement computed(
+      connection,
+      "SELECT EXISTS(SELECT 1 FROM pragma_table_xinfo(?1, 'main') "
+      "WHERE hidden <> 0 OR instr(dflt_value, '(') > 0) "
+      "OR EXISTS(SELECT 1 FROM pragma_index_list(?1, 'main') AS list WHERE list.partial <> 0 "
+      "OR EXISTS(SELECT 1 FROM pragma_index_xinfo(list.name, 'main') WHERE cid = -2))");
+  computed.Bind(1, table).Step();
+  return computed.Int(0) != 0;
 }
 
 }  // namespace
@@ -106,7 +150,18 @@ Database::Database(const std::filesystem::path& path, sqlite::Access access,
   CheckSchema();
 }
 
+void Database::ThrowNotColmaps(const std::string& problem) const {
+  throw DatabaseError(Path().string() + " is not a database of COLMAP 3.8 or later: " + problem +
+                      ". Give the database.db that `colmap feature_extractor` wrote.");
+}
+
+void Database::ThrowDamaged(const std::string& problem) const {
+  throw DatabaseError(Path().string() + " is damaged: " + problem +
+                      ". `sqlite3 FILE .recover` may save its contents.");
+}
+
 void Database::CheckSchema() {
+  // The first column is the key.
   const std::map<std::string, std::vector<std::string>> needed = {
       {"cameras", {"camera_id", "model", "width", "height", "params"}},
       {"images", {"image_id", "name", "camera_id"}},
@@ -114,16 +169,37 @@ void Database::CheckSchema() {
       {"descriptors", {"image_id", "rows", "cols", "data"}},
       {"matches", {"pair_id", "rows", "cols", "data"}},
       {"two_view_geometries", {"pair_id", "rows", "cols", "data", "config", "F", "E", "H"}}};
+  // Views and virtual tables have no page of their own.
+  sqlite::Statement find_table(connection_,
+                               "SELECT rootpage FROM main.sqlite_schema WHERE type IN "
+                               "('table', 'view') AND name = ?1 COLLATE NOCASE");
+  // A key of several columns, or one that is not the rowid, has an index.
+  sqlite::Statement find_key(connection_,
+                             "SELECT 1 FROM pragma_table_info(?1, 'main') WHERE name = ?2 AND "
+                             "pk = 1 AND NOT EXISTS(SELECT 1 FROM pragma_index_list(?1, 'main') "
+                             "WHERE origin = 'pk')");
   for (const auto& [table, columns] : needed) {
+    if (!find_table.Bind(1, table).Step()) ThrowNotColmaps("it has no table " + table);
+    if (find_table.IsNull(0) || find_table.Int(0) == 0) {
+      ThrowNotColmaps("its " + table + " is a view or a virtual table");
+    }
+    find_table.Reset();
     const std::vector<std::string> existing = connection_.Columns(table);
     for (const std::string& column : columns) {
-      if (!Contains(existing, column)) {
-        throw DatabaseError(Path().string() + " is not a database of COLMAP 3.8 or later: " +
-                            (existing.empty() ? "it has no table " + table
-                                              : "its table " + table + " has no column " + column) +
-                            ". Give the database.db that `colmap feature_extractor` wrote.");
-      }
+      if (Contains(existing, column)) continue;
+      ThrowNotColmaps("its table " + table + " has no column " + column);
     }
+    if (!find_key.Bind(1, table).Bind(2, columns.front()).Step()) {
+      ThrowNotColmaps("its table " + table + " has not " + columns.front() +
+                      " as its INTEGER PRIMARY KEY");
+    }
+    find_key.Reset();
+  }
+  for (const char* table : {"matches", "two_view_geometries"}) {
+    if (!ComputesOnWriting(connection_, table)) continue;
+    ThrowNotColmaps(std::string("its table ") + table +
+                    " has generated columns, computed defaults, or indexes that are partial or on "
+                    "expressions");
   }
   const std::vector<std::string> existing = connection_.Columns("two_view_geometries");
   for (std::size_t i = 0; i < kGeometryColumns.size(); ++i) {
@@ -137,17 +213,23 @@ void Database::CheckSchema() {
 }
 
 std::vector<ImageRecord> Database::ReadImages() {
-  // The lengths of blobs are in the rows' headers: this reads no descriptor.
+  // The lengths of blobs are in the rows' headers: this reads no descriptor. (The length of a text
+  // would be its number of letters.)
   sqlite::Statement select(
       connection_,
       "SELECT images.image_id, images.name, descriptors.rows, descriptors.cols, "
-      "length(descriptors.data), keypoints.rows, keypoints.cols, length(keypoints.data), " +
+      "iif(typeof(descriptors.data) = 'blob', length(descriptors.data), 0), keypoints.rows, "
+      "keypoints.cols, iif(typeof(keypoints.data) = 'blob', length(keypoints.data), 0), " +
           std::string(descriptors_have_type_ ? "descriptors.type" : "0") +
           " FROM images LEFT JOIN descriptors ON descriptors.image_id = images.image_id "
           "LEFT JOIN keypoints ON keypoints.image_id = images.image_id ORDER BY images.image_id");
   std::vector<ImageRecord> images;
   bool any_features = false;
+  AscendingKeys ids;
+  std::int64_t num_bytes_left = 0;
   while (select.Step()) {
+    // Asked for within the transaction that the first row began: the file may be growing.
+    if (images.empty()) num_bytes_left = NumBytes(connection_);
     const std::int64_t id = select.Int(0);
     const std::int64_t rows = select.Int(2);
     const std::int64_t cols = select.Int(3);
@@ -158,6 +240,14 @@ std::vector<ImageRecord> Database::ReadImages() {
 
     ImageRecord image;
     image.name = select.Text(1);
+    // In a damaged file, parts of it can be in many rows at once, without end.
+    if (!ids.Add(id)) ThrowDamaged("the ids of its images do not ascend");
+    if (image.name.size() > kMaxNameLength) {
+      ThrowDamaged("the name of the image with id " + std::to_string(id) + " has " +
+                   std::to_string(image.name.size()) + " bytes, more than any path");
+    }
+    num_bytes_left -= static_cast<std::int64_t>(image.name.size()) + size + keypoint_size;
+    if (num_bytes_left < 0) ThrowDamaged("its images are larger than the file");
     const auto fail = [&](const std::string& problem) {
       throw DatabaseError("Image \"" + image.name + "\" (id " + std::to_string(id) + ") in " +
                           Path().string() + ": " + problem +
@@ -227,7 +317,9 @@ Descriptors Database::ReadDescriptors(ImageId image_id) {
   if (!select.Step()) return descriptors;
   descriptors.num_rows = static_cast<std::size_t>(select.Int(0));
   descriptors.data = select.CopyBlob(1);
-  if (descriptors.num_rows * kDescriptorDim != descriptors.data.size()) {
+  // Divided, not multiplied: a nonsensical number of rows must not overflow into a right one.
+  if (descriptors.data.size() % kDescriptorDim != 0 ||
+      descriptors.data.size() / kDescriptorDim != descriptors.num_rows) {
     throw DatabaseError("The descriptors of the image with id " + std::to_string(image_id) +
                         " in " + Path().string() +
                         " changed while they were read. Is another program writing "
@@ -255,7 +347,9 @@ Keypoints Database::ReadKeypoints(ImageId image_id) {
   keypoints.num_rows = static_cast<std::size_t>(select.Int(0));
   keypoints.num_cols = static_cast<std::size_t>(select.Int(1));
   const std::size_t size = select.Size(2);
-  if (keypoints.num_rows * keypoints.num_cols * sizeof(float) != size) {
+  const std::size_t row_size = keypoints.num_cols * sizeof(float);
+  if (keypoints.num_cols > kMaxKeypointCols || keypoints.num_rows > size ||
+      keypoints.num_rows * row_size != size) {
     throw DatabaseError("The keypoints of the image with id " + std::to_string(image_id) + " in " +
                         Path().string() +
                         " changed while they were read. Is another program writing "
@@ -301,8 +395,10 @@ std::vector<TestedPair> Database::ReadTestedPairs() {
   sqlite::Statement select(
       connection_, "SELECT pair_id, rows, config FROM two_view_geometries ORDER BY pair_id");
   std::vector<TestedPair> tested;
+  AscendingKeys keys;
   while (select.Step()) {
     TestedPair pair;
+    if (!keys.Add(select.Int(0))) ThrowDamaged("the keys of two_view_geometries do not ascend");
     const auto pair_id = static_cast<PairId>(select.Int(0));
     if (!IsColmapsKey(pair_id)) continue;
     pair.pair = DecodePair(pair_id);
@@ -314,13 +410,16 @@ std::vector<TestedPair> Database::ReadTestedPairs() {
 }
 
 std::vector<ImagePair> Database::ReadUnverifiedPairs() {
+  // Every row is looked at here, not by SQLite, so that rows without end are noticed.
   sqlite::Statement select(connection_,
-                           "SELECT pair_id FROM matches WHERE pair_id NOT IN "
-                           "(SELECT pair_id FROM two_view_geometries) ORDER BY pair_id");
+                           "SELECT pair_id, pair_id NOT IN (SELECT pair_id FROM "
+                           "two_view_geometries) FROM matches ORDER BY pair_id");
   std::vector<ImagePair> pairs;
+  AscendingKeys keys;
   while (select.Step()) {
+    if (!keys.Add(select.Int(0))) ThrowDamaged("the keys of matches do not ascend");
     const auto pair_id = static_cast<PairId>(select.Int(0));
-    if (IsColmapsKey(pair_id)) pairs.push_back(DecodePair(pair_id));
+    if (select.Int(1) != 0 && IsColmapsKey(pair_id)) pairs.push_back(DecodePair(pair_id));
   }
   return pairs;
 }

@@ -82,7 +82,8 @@ class Database {
   // at the same time.
   std::map<ImageId, std::uint32_t> ReadFrames();
 
-  // The pairs that have a row in `two_view_geometries`, ascending. (COLMAP's matchers also ask for
+  // The pairs that have a row in `two_view_geometries`, ascending; keys that stand for no pair are
+  // left out. (COLMAP's matchers also ask for
   // a row in `matches` before they skip a pair; what is verified is never verified again here.)
   std::vector<TestedPair> ReadTestedPairs();
 
@@ -101,6 +102,9 @@ class Database {
 
  private:
   void CheckSchema();
+  [[noreturn]] void ThrowNotColmaps(const std::string& problem) const;
+  // What `problem` says of the file is only possible if it is damaged.
+  [[noreturn]] void ThrowDamaged(const std::string& problem) const;
 
   sqlite::Connection connection_;
   bool unset_is_null_ = true;

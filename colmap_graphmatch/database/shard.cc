@@ -55,6 +55,31 @@ sqlite::Blob CheckedMatches(const sqlite::Statement& row, int rows_column, int c
   return matches;
 }
 
+std::size_t NumKeypoints(sqlite::Connection& shard, ImageId image_id) {
+  sqlite::Statement select(shard, "SELECT rows FROM main.keypoints WHERE image_id = ?1");
+  const bool found = select.Bind(1, std::int64_t{image_id}).Step();
+  return found ? static_cast<std::size_t>(std::max<std::int64_t>(0, select.Int(0))) : 0;
+}
+
+// COLMAP takes the matches that a database has as they are and would read beyond the features.
+void CheckCopiedMatches(sqlite::Connection& shard, const std::filesystem::path& database_path) {
+  sqlite::Statement select(shard, "SELECT rows, cols, data, pair_id FROM main.matches");
+  while (select.Step()) {
+    const ImagePair pair = DecodePair(static_cast<PairId>(select.Int(3)));
+    try {
+      CheckedMatches(select, 0, 1, 2, NumKeypoints(shard, pair.id1), NumKeypoints(shard, pair.id2));
+    } catch (const DatabaseError& error) {
+      throw DatabaseError(
+          "The matches that " + database_path.string() + " has for the images with ids " +
+          std::to_string(pair.id1) + " and " + std::to_string(pair.id2) + " contain " +
+          error.what() +
+          ". Were features extracted again after matching? Delete matches that were not "
+          "verified, so that these pairs are matched again: sqlite3 FILE \"DELETE FROM matches "
+          "WHERE pair_id NOT IN (SELECT pair_id FROM two_view_geometries)\".");
+    }
+  }
+}
+
 }  // namespace
 
 std::string ShardImageName(ImageId image_id) { return std::to_string(image_id); }
@@ -95,6 +120,7 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
   shard.Execute(CopyTable(shard, "matches", {}) +
                 " WHERE pair_id IN (SELECT pair_id FROM pair_ids) AND pair_id NOT IN "
                 "(SELECT pair_id FROM source.two_view_geometries)");
+  CheckCopiedMatches(shard, database_path);
   sqlite::Statement add_matches(
       shard,
       "INSERT OR REPLACE INTO main.matches(pair_id, rows, cols, data) VALUES(?1, ?2, 2, ?3)");

@@ -28,7 +28,8 @@ struct ShardPair {
 // empty shard, their descriptors if COLMAP is to match, and the rows of `matches` of those pairs
 // that have some: matches that were made elsewhere and await verification. Adds the matches of the
 // pairs. Ids stay the same. Throws DatabaseError, also if a pair has neither descriptors nor
-// matches.
+// matches, and if the user's database has matches for it that cannot be: a blob of the wrong size,
+// features that the images do not have.
 void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
                double lock_timeout_seconds, const std::vector<ShardPair>& pairs,
                bool with_descriptors);

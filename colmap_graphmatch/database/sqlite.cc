@@ -13,6 +13,29 @@
 namespace colmap_graphmatch::sqlite {
 namespace {
 
+// Pages that refer to each other in a damaged file can keep SQLite busy for ever, so its virtual
+// machine gets no more instructions than take a second or two: fewer to prepare a statement, for
+// then it reads the schema and parses every line of it; enough in a step to fill a shard of 100,000
+// pairs.
+constexpr int kInstructionsPerProgressCall = 100000;
+constexpr int kProgressCallsToPrepare = 5;
+constexpr int kProgressCallsToRun = 300;
+
+int CountProgressCall(void* num_calls_left) { return --*static_cast<int*>(num_calls_left) < 0; }
+
+// SQLite's advice for files from strangers (https://www.sqlite.org/security.html). COLMAP's
+// databases have no views, triggers or virtual tables in any version; users' own do no harm as long
+// as they are not run.
+void Harden(sqlite3* db) {
+  sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_drop_modules(db, nullptr);
+  sqlite3_limit(db, SQLITE_LIMIT_ATTACHED, 1);
+  sqlite3_limit(db, SQLITE_LIMIT_WORKER_THREADS, 0);
+}
+
 // A file: URI, in which '?', '#' and '%' of the path would otherwise have a meaning.
 std::string ReadOnlyUri(const std::filesystem::path& path) {
   static constexpr char kHex[] = "0123456789ABCDEF";
@@ -50,13 +73,15 @@ Connection::Connection(const std::filesystem::path& path, Access access,
     : path_(path),
       lockable_path_(path),
       lock_timeout_seconds_(lock_timeout_seconds),
+      progress_calls_left_(std::make_unique<int>(kProgressCallsToPrepare)),
       db_(nullptr, &sqlite3_close) {
   const int mode = access == Access::kRead        ? SQLITE_OPEN_READONLY
                    : access == Access::kReadWrite ? SQLITE_OPEN_READWRITE
                                                   : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
   sqlite3* db = nullptr;
+  // Absolute: a relative path could begin like a URI.
   const int result =
-      sqlite3_open_v2(path.c_str(), &db, mode | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
+      sqlite3_open_v2(std::filesystem::absolute(path).c_str(), &db, mode | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
   db_.reset(db);
   if (result != SQLITE_OK) Throw("open the database");
   // SQLite falls back to reading a file that it may not write, without a word.
@@ -69,9 +94,14 @@ Connection::Connection(const std::filesystem::path& path, Access access,
   sqlite3_extended_result_codes(db, 1);
   const double milliseconds = std::clamp(1e3 * lock_timeout_seconds, 0.0, 1e9);
   sqlite3_busy_timeout(db, static_cast<int>(milliseconds));
+  Harden(db);
+  sqlite3_progress_handler(db, kInstructionsPerProgressCall, &CountProgressCall,
+                           progress_calls_left_.get());
+  Execute("PRAGMA cell_size_check = ON; PRAGMA ignore_check_constraints = ON");
 }
 
 void Connection::Execute(const std::string& sql) {
+  *progress_calls_left_ = kProgressCallsToRun;
   if (sqlite3_exec(db_.get(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
     Throw("run \"" + sql.substr(0, 60) + "\"");
   }
@@ -109,6 +139,10 @@ void Connection::Throw(const std::string& doing) const {
       throw DamagedFileError(path_.string() +
                              " is not a SQLite database. Give the database.db that "
                              "`colmap feature_extractor` wrote.");
+    case SQLITE_INTERRUPT:
+      throw DatabaseError(what +
+                          "it does not come to an end. The file is damaged: `sqlite3 FILE "
+                          ".recover` may save its contents.");
     case SQLITE_CORRUPT:
       throw DamagedFileError(
           what + detail + ". The file is damaged: `sqlite3 FILE .recover` may save its contents.");
@@ -129,6 +163,7 @@ void Connection::Throw(const std::string& doing) const {
 
 Statement::Statement(Connection& connection, const std::string& sql)
     : connection_(&connection), statement_(nullptr, &sqlite3_finalize) {
+  *connection.progress_calls_left_ = kProgressCallsToPrepare;
   sqlite3_stmt* statement = nullptr;
   if (sqlite3_prepare_v2(connection.db_.get(), sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
     connection.Throw("prepare \"" + sql.substr(0, 60) + "\"");
@@ -161,6 +196,7 @@ Statement& Statement::BindNull(int parameter) {
 }
 
 bool Statement::Step() {
+  *connection_->progress_calls_left_ = kProgressCallsToRun;
   switch (sqlite3_step(statement_.get())) {
     case SQLITE_ROW:
       return true;

@@ -16,6 +16,10 @@ struct sqlite3_stmt;
 
 // The little of SQLite that COLMAP databases need, with errors as exceptions: DatabaseLockedError
 // when another process held a lock for longer than the connection waits, DatabaseError otherwise.
+//
+// Databases come from strangers. Nothing that a file brings along is run: no views, no triggers, no
+// virtual tables, no CHECK constraints; and a step that does not come to an end, which takes a
+// damaged file, is an error.
 
 namespace colmap_graphmatch::sqlite {
 
@@ -57,6 +61,7 @@ class Connection {
   std::filesystem::path path_;
   std::filesystem::path lockable_path_;  // The file that other programs may have locked.
   double lock_timeout_seconds_;
+  std::unique_ptr<int> progress_calls_left_;  // Of the call under way; SQLite has its address.
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> db_;
 };
 

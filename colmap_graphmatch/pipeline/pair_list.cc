@@ -57,16 +57,19 @@ std::unordered_map<std::string, ImageId> IdsByName(const std::vector<ImageRecord
 
 PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
   const std::unordered_map<std::string, ImageId> ids = IdsByName(images);
+  std::size_t longest_name = 0;
+  for (const auto& [name, id] : ids) longest_name = std::max(longest_name, name.size());
   PairList list;
   for (const auto& [line_number, line] : ReadLines(path, "image pairs", "two image names a line")) {
     // Every way to cut it into a name, another, and what may follow, e.g. a score.
     const char separator = line.find('\t') != std::string::npos ? '\t' : ' ';
+    // No two names reach further, and a line may be a whole file.
+    const std::size_t end = std::min(line.size(), 2 * longest_name + 1);
     std::vector<std::size_t> cuts;
-    for (std::size_t cut = line.find(separator); cut != std::string::npos;
-         cut = line.find(separator, cut + 1)) {
+    for (std::size_t cut = line.find(separator); cut < end; cut = line.find(separator, cut + 1)) {
       cuts.push_back(cut);
     }
-    cuts.push_back(line.size());
+    if (end == line.size() || line[end] == separator) cuts.push_back(end);
     std::size_t num_ways = 0;
     ImagePair pair;
     for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {

@@ -18,6 +18,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <map>
@@ -89,6 +90,8 @@ int ImportMatches(const std::map<std::string, std::string>& options) {
     if (name.find('.') != std::string::npos) arguments += " " + name + "=" + value;
   }
   Log("run" + arguments);
+  const auto mode = std::filesystem::status(database.Path().parent_path()).permissions();
+  Log(mode == std::filesystem::perms::owner_all ? "private directory" : "open directory");
   const std::string fault = Environment("FAKE_COLMAP_FAULT", "");
   const std::string fault_pair = Environment("FAKE_COLMAP_FAULT_PAIR", "");
   const auto fault_image =
