@@ -136,8 +136,7 @@ TEST_P(AnySchema, MarksUnsetMatricesAsThatVersionDoes) {
 }
 
 TEST_P(AnySchema, KeepsAPoseWithoutTranslationWhole) {
-  // As COLMAP 3.9 to 3.13 write it where no relative pose was asked for. COLMAP 4 refuses half a
-  // pose.
+  // COLMAP 4 refuses half a pose.
   Write(GetParam());
   Database database = Open();
   PairRows edge = MakeRows(ImagePair(1, 2), 20);
@@ -146,6 +145,33 @@ TEST_P(AnySchema, KeepsAPoseWithoutTranslationWhole) {
   edge.geometry[4] = sqlite::Blob(24, 0);
   database.WritePairs({edge});
   EXPECT_EQ(Query("SELECT length(qvec) = 32 AND tvec = zeroblob(24) FROM two_view_geometries"), 1);
+}
+
+TEST_P(AnySchema, TakesTheIdentityForAPoseThatIsNotSet) {
+  // COLMAP 3.9 to 3.13 write it where no relative pose was asked for; COLMAP 4 would take it for
+  // one. 3.8 writes zeros of either sign.
+  Write(GetParam());
+  Database database = Open();
+  PairRows identity = MakeRows(ImagePair(1, 2), 20);
+  const auto blob = [](const std::vector<double>& values) {
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(values.data());
+    return sqlite::Blob(bytes, bytes + values.size() * sizeof(double));
+  };
+  identity.geometry[3] = blob({1, 0, 0, 0});
+  identity.geometry[4] = blob({0, -0.0, 0});
+  PairRows negative = MakeRows(ImagePair(1, 3), 20);
+  negative.geometry[3] = blob({0, -0.0, -0.0, -0.0});
+  negative.geometry[4] = blob({0, 0, 0});
+  PairRows moved = MakeRows(ImagePair(2, 3), 20);
+  moved.geometry[3] = blob({1, 0, 0, 0});
+  moved.geometry[4] = blob({0, 1, 0});
+  database.WritePairs({identity, negative, moved});
+  EXPECT_EQ(Query(GetParam() == Schema::kColmap38
+                      ? "SELECT count(*) FROM two_view_geometries WHERE qvec = zeroblob(32) AND "
+                        "tvec = zeroblob(24)"
+                      : "SELECT count(*) FROM two_view_geometries WHERE qvec IS NULL AND tvec IS "
+                        "NULL"),
+            2);
 }
 
 TEST_P(AnySchema, LeavesTheVersionAlone) {

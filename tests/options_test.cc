@@ -58,7 +58,8 @@ TEST(OptionTable, EveryRowTakesItsDefaultAndRefusesWhatItMustNotBe) {
     }
     const bool is_checked = row.values.find("integer") != std::string::npos ||
                             row.values.find("number") != std::string::npos ||
-                            row.values.find("one of") != std::string::npos || row.values == "0 or 1";
+                            row.values.find("one of") != std::string::npos ||
+                            row.values == "0 or 1";
     if (!is_checked) continue;
     for (const char* text : {"", "-2", "x", "1e999", "nan", "1 2", "0x"}) {
       EXPECT_FALSE(row.read(text)) << row.name << " \"" << text << "\"";
@@ -96,8 +97,9 @@ TEST(Options, TwoSpellingsMustAgree) {
   const std::vector<std::string> same = {"--SiftMatching.max_error", "4",
                                          "--TwoViewGeometry.max_error", "4.0"};
   EXPECT_EQ(ErrorOf(same), "no error");
-  EXPECT_THAT(ErrorOf({"--SiftMatching.max_error", "4", "--TwoViewGeometry.max_error", "5"}),
-              HasSubstr("--SiftMatching.max_error 4 and --TwoViewGeometry.max_error 5 are the same"));
+  EXPECT_THAT(
+      ErrorOf({"--SiftMatching.max_error", "4", "--TwoViewGeometry.max_error", "5"}),
+      HasSubstr("--SiftMatching.max_error 4 and --TwoViewGeometry.max_error 5 are the same"));
   EXPECT_THAT(ErrorOf({"--random_seed", "1", "--default_random_seed", "2"}),
               HasSubstr("are the same option with different values"));
   EXPECT_THAT(
@@ -113,17 +115,18 @@ TEST(Options, OfTheVocabularyTreeThatHaveAMeaningHere) {
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 50);
   EXPECT_EQ(line.pipeline.image_list_path, "images.txt");
   EXPECT_THAT(line.unused_options, IsEmpty());
-  EXPECT_THAT(ErrorOf({"--VocabTreeMatching.match_list_path", "a", "--GraphMatching.match_list_path",
-                       "b"}),
-              HasSubstr("give one of them"));
+  EXPECT_THAT(
+      ErrorOf({"--VocabTreeMatching.match_list_path", "a", "--GraphMatching.match_list_path", "b"}),
+      HasSubstr("give one of them"));
 }
 
 TEST(Options, WithoutMeaningAreSaidOnce) {
   const CommandLine line = Parse({"--VocabTreeMatching.vocab_tree_path", "tree.bin",
                                   "--VocabTreeMatching.num_checks", "64", "--log_level", "0"});
-  EXPECT_THAT(line.unused_options,
-              ElementsAre(HasSubstr("--VocabTreeMatching.vocab_tree_path has no effect here: there is"),
-                          HasSubstr("num_checks"), HasSubstr("log_level")));
+  EXPECT_THAT(
+      line.unused_options,
+      ElementsAre(HasSubstr("--VocabTreeMatching.vocab_tree_path has no effect here: there is"),
+                  HasSubstr("num_checks"), HasSubstr("log_level")));
 }
 
 TEST(Options, SeedsReachColmapToo) {
@@ -182,8 +185,8 @@ TEST_F(ProjectTest, TheCommandLineGoesBeforeInAnySpelling) {
   CommandLine line = Parse(arguments);
   EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "3")));
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 30);
-  arguments.insert(arguments.end(), {"--TwoViewGeometry.max_error", "5",
-                                     "--GraphMatching.max_num_neighbors", "40"});
+  arguments.insert(arguments.end(),
+                   {"--TwoViewGeometry.max_error", "5", "--GraphMatching.max_num_neighbors", "40"});
   line = Parse(arguments);
   EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "5")));
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 40);
@@ -191,9 +194,10 @@ TEST_F(ProjectTest, TheCommandLineGoesBeforeInAnySpelling) {
 }
 
 TEST_F(ProjectTest, DefaultsWithoutMeaningAreNotMentioned) {
-  EXPECT_THAT(Parse(Project("log_to_stderr=false\nlog_level=2\n[VocabTreeMatching]\nnum_checks=64\n"))
-                  .unused_options,
-              IsEmpty());
+  EXPECT_THAT(
+      Parse(Project("log_to_stderr=false\nlog_level=2\n[VocabTreeMatching]\nnum_checks=64\n"))
+          .unused_options,
+      IsEmpty());
   EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_checks=65\n")).unused_options,
               ElementsAre(HasSubstr("num_checks")));
 }
@@ -201,8 +205,9 @@ TEST_F(ProjectTest, DefaultsWithoutMeaningAreNotMentioned) {
 TEST_F(ProjectTest, ErrorsNameTheFile) {
   EXPECT_THAT(ErrorOf(Project("[SiftMatching]\nmax_ratio=x\n")), HasSubstr("project.ini is \"x\""));
   EXPECT_THAT(ErrorOf(Project("[SiftMatching\n")), HasSubstr("is no ini file"));
-  EXPECT_THAT(ErrorOf(Project("[GraphMatching]\nstrateg=exhaustive\n")),
-              HasSubstr("unknown option GraphMatching.strateg. Did you mean --GraphMatching.strategy?"));
+  EXPECT_THAT(
+      ErrorOf(Project("[GraphMatching]\nstrateg=exhaustive\n")),
+      HasSubstr("unknown option GraphMatching.strateg. Did you mean --GraphMatching.strategy?"));
   EXPECT_THAT(ErrorOf(Project("[SiftMatching]\nmax_error=1\n[TwoViewGeometry]\nmax_error=2\n")),
               HasSubstr("are the same option with different values"));
   EXPECT_THAT(ErrorOf({"--project_path", directory_.Path().string()}), HasSubstr("Cannot read"));

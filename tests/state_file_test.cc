@@ -179,8 +179,9 @@ TEST(Fingerprints, ChangeWithTheFeatures) {
   EXPECT_NE(before[0].features, before[1].features);
   sqlite::Connection connection(path, sqlite::Access::kReadWrite, 1);
   // Image 2 gets the features of image 1, image 3 loses them, image 4 gets other keypoints.
-  connection.Execute("UPDATE descriptors SET data = (SELECT data FROM descriptors WHERE image_id = 1) "
-                     "WHERE image_id = 2");
+  connection.Execute(
+      "UPDATE descriptors SET data = (SELECT data FROM descriptors WHERE image_id = 1) "
+      "WHERE image_id = 2");
   connection.Execute("UPDATE descriptors SET rows = 0, data = NULL WHERE image_id = 3");
   connection.Execute("UPDATE keypoints SET data = zeroblob(length(data)) WHERE image_id = 4");
   const std::vector<ImageFingerprint> after = read();

@@ -87,22 +87,23 @@ void PrintHelp(std::ostream& stream) {
 }
 
 void PrintOptionsDocument(std::ostream& stream) {
-  stream << "# Options\n\n"
-            "Generated from the table in `colmap_graphmatch/cli/option_table.cc`, which the program "
-            "itself reads; tests hold it\nagainst what `colmap vocab_tree_matcher -h` prints.\n\n"
-            "- Every option of `colmap vocab_tree_matcher` of COLMAP 3.8 to 4.2 is accepted, in the "
-            "spelling of any version. Those\n  of matching and verification may be given in each of "
-            "the groups `SiftMatching`, `TwoViewGeometry` and\n  `FeatureMatching`. They reach COLMAP "
-            "in the spelling of the installed version. What is not given keeps that COLMAP's\n  own "
-            "default.\n"
-            "- The same option twice, in one spelling or two, must have the same value: otherwise "
-            "exit code 1.\n"
-            "- An option that the installed COLMAP does not have is named in a warning. An unknown "
-            "option is an error that names the\n  nearest one.\n"
-            "- `--project_path` reads an ini file as COLMAP writes it (`colmap project_generator`). "
-            "What is on the command line goes\n  before it; options of other commands in it are left "
-            "alone; every value in it counts as given.\n"
-            "- Booleans are `1` or `0`; `true`, `yes`, `on` and their opposites will do.\n";
+  stream
+      << "# Options\n\n"
+         "Generated from the table in `colmap_graphmatch/cli/option_table.cc`, which the program "
+         "itself reads; tests hold it\nagainst what `colmap vocab_tree_matcher -h` prints.\n\n"
+         "- Every option of `colmap vocab_tree_matcher` of COLMAP 3.8 to 4.2 is accepted, in the "
+         "spelling of any version. Those\n  of matching and verification may be given in each of "
+         "the groups `SiftMatching`, `TwoViewGeometry` and\n  `FeatureMatching`. They reach COLMAP "
+         "in the spelling of the installed version. What is not given keeps that COLMAP's\n  own "
+         "default.\n"
+         "- The same option twice, in one spelling or two, must have the same value: otherwise "
+         "exit code 1.\n"
+         "- An option that the installed COLMAP does not have is named in a warning. An unknown "
+         "option is an error that names the\n  nearest one.\n"
+         "- `--project_path` reads an ini file as COLMAP writes it (`colmap project_generator`). "
+         "What is on the command line goes\n  before it; options of other commands in it are left "
+         "alone; every value in it counts as given.\n"
+         "- Booleans are `1` or `0`; `true`, `yes`, `on` and their opposites will do.\n";
   CommandLine defaults;
   const std::vector<OptionRow> rows = MakeOptionTable(&defaults);
   std::string section;
@@ -115,8 +116,8 @@ void PrintOptionsDocument(std::ostream& stream) {
     }
     const bool here = row.use == OptionRow::Use::kOwn || row.use == OptionRow::Use::kHere;
     stream << "| `" << row.name << "` | " << Cell(row.values) << " | "
-           << Cell(here ? row.default_value : ColmapDefaults(row)) << " | " << Cell(row.help) << " | "
-           << ColmapSpellings(row) << " |\n";
+           << Cell(here ? row.default_value : ColmapDefaults(row)) << " | " << Cell(row.help)
+           << " | " << ColmapSpellings(row) << " |\n";
   }
 }
 

@@ -302,7 +302,8 @@ void Table::AddGraph() {
   Add("GraphMatching.number_sample_iterations", IntOf(&p.graph.number_sample_iterations, 0),
       "iterations (>= 0) that sample before propagating; later ones only propagate");
   Add("GraphMatching.max_tests_for_sampling", IntOf(&p.graph.max_tests_for_sampling, 0),
-      "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N images. "
+      "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N "
+      "images. "
       "More finds weaker links and costs up to N tests for each");
   OptionRow& neighbors =
       Add("GraphMatching.max_num_neighbors", IntOf(&p.graph.max_num_neighbors, 1),
@@ -322,8 +323,8 @@ void Table::AddGraph() {
       "neighbor");
   Add("GraphMatching.propagate_untested_only", BoolOf(&p.graph.propagate_untested_only),
       "take the best among the untested; 0: among all, then drop the tested");
-  Add("GraphMatching.propagate_from_new_edges_only",
-      BoolOf(&p.graph.propagate_from_new_edges_only), "propagate along each edge only once");
+  Add("GraphMatching.propagate_from_new_edges_only", BoolOf(&p.graph.propagate_from_new_edges_only),
+      "propagate along each edge only once");
   Add("GraphMatching.stop_sampling_without_edges", BoolOf(&p.graph.stop_sampling_without_edges),
       "end sampling after an iteration that found no edge");
 }
@@ -379,17 +380,22 @@ void Table::AddColmapMatching() {
   PipelineOptions& p = line_->pipeline;
   DescriptorMatchingOptions& matching = p.verification.exact.matching;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Section("COLMAP's options of matching and verification, accepted in each of the groups "
-          "SiftMatching, TwoViewGeometry and FeatureMatching");
-  AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.use_gpu", "1"}, {{3, 13}, "FeatureMatching.use_gpu", "1"}},
+  Section(
+      "COLMAP's options of matching and verification, accepted in each of the groups "
+      "SiftMatching, TwoViewGeometry and FeatureMatching");
+  AddGrouped(Use::kHere,
+             {{{3, 8}, "SiftMatching.use_gpu", "1"}, {{3, 13}, "FeatureMatching.use_gpu", "1"}},
              BoolOf(&p.verification.use_gpu), "match on the GPU if the installed COLMAP can");
   PassText({{{3, 8}, "SiftMatching.gpu_index", "-1"}, {{3, 13}, "FeatureMatching.gpu_index", "-1"}},
            "which GPUs, e.g. 0,1; -1: all");
+  AddGrouped(
+      Use::kHere,
+      {{{3, 8}, "SiftMatching.num_threads", "-1"}, {{3, 13}, "FeatureMatching.num_threads", "-1"}},
+      IntOf(&p.num_threads, 1, ", or -1 for all cores"),
+      "cores to use at a time, COLMAP's included; -1: all");
   AddGrouped(Use::kHere,
-             {{{3, 8}, "SiftMatching.num_threads", "-1"}, {{3, 13}, "FeatureMatching.num_threads", "-1"}},
-             IntOf(&p.num_threads, 1, ", or -1 for all cores"),
-             "cores to use at a time, COLMAP's included; -1: all");
-  AddGrouped(Use::kHere, {{{3, 13}, "FeatureMatching.type", "SIFT"}, {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},
+             {{{3, 13}, "FeatureMatching.type", "SIFT"},
+              {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},
              {"one of SIFT, SIFT_BRUTEFORCE, SIFT_LIGHTGLUE: only SIFT features are matched", "",
               [line = line_](const std::string& text) {
                 line->lightglue = text == "SIFT_LIGHTGLUE";
@@ -402,8 +408,7 @@ void Table::AddColmapMatching() {
   AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.max_distance", "0.7"}},
              DoubleOf(&matching.max_distance, Zero::kNotAllowed),
              "greatest angle to the best match, in radians");
-  AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.cross_check", "1"}},
-             BoolOf(&matching.cross_check),
+  AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.cross_check", "1"}}, BoolOf(&matching.cross_check),
              "keep a match only if it is the best in both directions");
   AddGrouped(Use::kHere,
              {{{3, 8}, "SiftMatching.max_num_matches", "32768"},
@@ -486,13 +491,12 @@ void Table::AddUnusedOptions() {
 
   using NamesAndDefaults = std::vector<std::pair<const char*, const char*>>;
   const char* sift = "only SIFT features are matched";
-  for (const auto& [name, default_value] :
-       NamesAndDefaults{{"brute_force_min_cossim", "0.85"},
-                        {"brute_force_max_ratio", "1"},
-                        {"brute_force_cross_check", "1"},
-                        {"bruteforce_model_path", ""},
-                        {"lightglue_min_score", "0.1"},
-                        {"lightglue_model_path", ""}}) {
+  for (const auto& [name, default_value] : NamesAndDefaults{{"brute_force_min_cossim", "0.85"},
+                                                            {"brute_force_max_ratio", "1"},
+                                                            {"brute_force_cross_check", "1"},
+                                                            {"bruteforce_model_path", ""},
+                                                            {"lightglue_min_score", "0.1"},
+                                                            {"lightglue_model_path", ""}}) {
     AddUnused({{{4, 0}, std::string("AlikedMatching.") + name, default_value}}, sift);
   }
   for (const auto& [name, default_value] : NamesAndDefaults{{"min_score", "0.1"},

@@ -38,7 +38,7 @@ struct OptionRow {
   };
 
   std::string section;
-  std::string name;   // The spelling that the help shows: for options of COLMAP its newest one.
+  std::string name;  // The spelling that the help shows: for options of COLMAP its newest one.
   Use use = Use::kOwn;
   std::string values;  // What follows "it must be" in the error; empty: a flag without a value.
   std::string default_value;

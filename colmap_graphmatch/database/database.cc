@@ -65,8 +65,21 @@ std::string Join(const std::vector<std::string>& values) {
   return joined;
 }
 
+std::vector<double> Doubles(const sqlite::Blob& blob) {
+  std::vector<double> values(blob.size() / sizeof(double));
+  if (!values.empty()) std::memcpy(values.data(), blob.data(), values.size() * sizeof(double));
+  return values;
+}
+
+// Of either sign: COLMAP 3.8 inverts an unset pose to negative zeros.
 bool AllZero(const sqlite::Blob& blob) {
-  return std::all_of(blob.begin(), blob.end(), [](std::uint8_t byte) { return byte == 0; });
+  const std::vector<double> values = Doubles(blob);
+  return std::all_of(values.begin(), values.end(), [](double value) { return value == 0; });
+}
+
+// COLMAP 3.9 to 3.13 write the identity for an unset pose.
+bool IsIdentity(const sqlite::Blob& qvec, const sqlite::Blob& tvec) {
+  return Doubles(qvec) == std::vector<double>{1, 0, 0, 0} && AllZero(tvec);
 }
 
 // False for keys that COLMAP never writes, e.g. with the larger id first: they name no pair.
@@ -464,12 +477,13 @@ void Database::WritePairs(const std::vector<PairRows>& pairs) {
     const auto is_unset = [&pair](std::size_t i) {
       return !pair.geometry[i].has_value() || AllZero(*pair.geometry[i]);
     };
+    const bool pose_is_unset = is_unset(kQvecColumn) || !pair.geometry[kTvecColumn].has_value() ||
+                               IsIdentity(*pair.geometry[kQvecColumn], *pair.geometry[kTvecColumn]);
     int parameter = 6;
     for (const std::size_t i : geometry_columns_) {
       const std::optional<sqlite::Blob>& value = pair.geometry[i];
       // A pose is set as a whole: no rotation is all zeros, but a translation can be.
-      const bool unset =
-          i == kTvecColumn ? is_unset(kQvecColumn) || !value.has_value() : is_unset(i);
+      const bool unset = i == kQvecColumn || i == kTvecColumn ? pose_is_unset : is_unset(i);
       if (!unset) {
         insert_geometry.Bind(parameter, *value);
       } else if (unset_is_null_ || pair.num_inliers == 0) {

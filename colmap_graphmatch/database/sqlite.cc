@@ -80,8 +80,8 @@ Connection::Connection(const std::filesystem::path& path, Access access,
                                                   : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
   sqlite3* db = nullptr;
   // Absolute: a relative path could begin like a URI.
-  const int result =
-      sqlite3_open_v2(std::filesystem::absolute(path).c_str(), &db, mode | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
+  const int result = sqlite3_open_v2(std::filesystem::absolute(path).c_str(), &db,
+                                     mode | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
   db_.reset(db);
   if (result != SQLITE_OK) Throw("open the database");
   // SQLite falls back to reading a file that it may not write, without a word.

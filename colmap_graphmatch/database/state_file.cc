@@ -30,18 +30,20 @@ std::int64_t ReadNumber(sqlite::Connection& connection, const std::string& sql) 
 }
 
 void CreateTables(sqlite::Connection& connection) {
-  connection.Execute("CREATE TABLE mixture(key TEXT NOT NULL, checksum INTEGER NOT NULL, "
-                     "data BLOB NOT NULL)");
-  connection.Execute("CREATE TABLE vectors(image_id INTEGER PRIMARY KEY NOT NULL, features INTEGER "
-                     "NOT NULL, checksum INTEGER NOT NULL, data BLOB NOT NULL)");
+  connection.Execute(
+      "CREATE TABLE mixture(key TEXT NOT NULL, checksum INTEGER NOT NULL, "
+      "data BLOB NOT NULL)");
+  connection.Execute(
+      "CREATE TABLE vectors(image_id INTEGER PRIMARY KEY NOT NULL, features INTEGER "
+      "NOT NULL, checksum INTEGER NOT NULL, data BLOB NOT NULL)");
   connection.Execute("CREATE TABLE run(key TEXT NOT NULL)");
   connection.Execute("CREATE TABLE seeds(pair_id INTEGER PRIMARY KEY NOT NULL)");
   connection.Execute("PRAGMA application_id = " + std::to_string(kApplicationId));
   connection.Execute("PRAGMA user_version = " + std::to_string(kFormatVersion));
 }
 
-// For a file that SQLite cannot read any more. No connection to it may be open in this process: that
-// would lose its locks.
+// For a file that SQLite cannot read any more. No connection to it may be open in this process:
+// that would lose its locks.
 bool HeaderIsOurs(const std::filesystem::path& path) {
   // SQLite keeps the number big-endian at this place of the header.
   constexpr std::streamoff kOffset = 68;

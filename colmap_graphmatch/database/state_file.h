@@ -18,8 +18,8 @@ namespace colmap_graphmatch {
 // as long as the object lives, so that only one run works on a database at a time. What is damaged
 // in it is as if it were not there; it can be deleted at any time and costs only what it saves.
 //
-// Errors: DatabaseError, e.g. if the file cannot be written; DatabaseLockedError if another run held
-// it for longer than the given time.
+// Errors: DatabaseError, e.g. if the file cannot be written; DatabaseLockedError if another run
+// held it for longer than the given time.
 class StateFile {
  public:
   // The file that belongs to a database. Links are followed: a database has one state.

@@ -107,13 +107,13 @@ void RunState::Try(const std::function<void()>& action) {
 void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images) {
   images_ = std::move(images);
   const GmmOptions& gmm = options.gmm;
-  vectors_key_ =
-      "components " + std::to_string(gmm.num_components) + ", tolerance " + Hex(gmm.tolerance) +
-      ", iterations " + std::to_string(gmm.max_num_iterations) + ", variance floor " +
-      Hex(gmm.variance_floor) + ", training " + std::to_string(options.num_training_descriptors) +
-      ", features " + std::to_string(options.max_num_features) + ", selection " +
-      std::to_string(static_cast<int>(options.feature_selection)) + ", seed " +
-      std::to_string(options.seed) + " " + std::to_string(gmm.seed);
+  vectors_key_ = "components " + std::to_string(gmm.num_components) + ", tolerance " +
+                 Hex(gmm.tolerance) + ", iterations " + std::to_string(gmm.max_num_iterations) +
+                 ", variance floor " + Hex(gmm.variance_floor) + ", training " +
+                 std::to_string(options.num_training_descriptors) + ", features " +
+                 std::to_string(options.max_num_features) + ", selection " +
+                 std::to_string(static_cast<int>(options.feature_selection)) + ", seed " +
+                 std::to_string(options.seed) + " " + std::to_string(gmm.seed);
 }
 
 std::optional<GaussianMixture> RunState::ReadMixture() {

@@ -22,8 +22,8 @@ class RunState {
   using Say = std::function<void(const std::string&)>;
 
   // Waits for another run on the same database, up to lock_timeout_seconds. Throws
-  // DatabaseLockedError if it is still at work then; DatabaseError if something else is in the place
-  // of the file.
+  // DatabaseLockedError if it is still at work then; DatabaseError if something else is in the
+  // place of the file.
   RunState(const std::filesystem::path& database_path, double lock_timeout_seconds, const Say& info,
            const Say& warn);
 

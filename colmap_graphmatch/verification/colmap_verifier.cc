@@ -47,6 +47,10 @@ constexpr std::size_t kMaxUnrelatedFailures = 4;
 constexpr double kPatience = 20;
 constexpr double kMinTimeoutSeconds = 30;
 
+// The first COLMAP that is known to store pairs with too few matches as degenerate instead of
+// undefined.
+constexpr std::pair<int, int> kFirstDegenerate(4, 2);
+
 // Pairs that share images come into the same shard, and shards that do follow each other.
 std::vector<std::vector<ImagePair>> CutIntoShards(std::vector<ImagePair> pairs,
                                                   std::size_t min_pairs_per_shard,
@@ -162,6 +166,8 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
     shards_with_descriptors_ = guided != options.colmap_options.end() && guided->second != "0";
   }
 
+  // TwoViewGeometry::ConfigurationType: undefined, or degenerate.
+  unmatched_config_ = std::make_pair(colmap.major, colmap.minor) < kFirstDegenerate ? 0 : 1;
   WarnOfCutFeatures(images);
 
   std::map<std::string, std::string> colmap_options = options.colmap_options;
@@ -255,6 +261,7 @@ std::vector<ShardPair> ColmapVerifier::Match(const std::vector<ImagePair>& pairs
     if (matches[i].size() < static_cast<std::size_t>(options_.min_num_inliers)) {
       PairRows rows;
       rows.pair = to_match[i];
+      rows.config = unmatched_config_;
       unmatched.results.push_back(std::move(rows));
     } else {
       const auto* bytes = reinterpret_cast<const std::uint8_t*>(matches[i].data());

@@ -140,6 +140,7 @@ class ColmapVerifier : public PairVerifier {
   std::unique_ptr<ExactMatcher> exact_matcher_;  // None if COLMAP matches.
   std::vector<ImagePair> unverified_;  // Ascending; their matches are in the database already.
   bool shards_with_descriptors_ = true;
+  int unmatched_config_ = 0;  // What COLMAP stores for pairs with too few matches.
 
   // Guarded by the mutex of the batch.
   double slowest_seconds_per_pair_ = 0;  // 0 until a shard came back.

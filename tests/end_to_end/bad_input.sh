@@ -69,8 +69,8 @@ snapshot() {
   contents "$database" >"$work/contents.$1"
   grep -a -v -E "$pairs_pattern" "$work/contents.$1" >"$work/others.$1" || true
   grep -a -E "$pairs_pattern" "$work/contents.$1" | LC_ALL=C sort >"$work/pairs.$1" || true
-  # SQLite's own files beside the database are part of it.
-  { find "${database%/*}" "$disk" 2>/dev/null || true; } |
+  # SQLite's own files beside the database are part of it, and what a run keeps for the next one belongs there.
+  { find "${database%/*}" "$disk" ! -name '*.graphmatch' 2>/dev/null || true; } |
     grep -a -v -E -e '-(wal|shm|journal)$' | LC_ALL=C sort >"$work/files.$1"
 }
 
@@ -85,7 +85,7 @@ message() {
   text=${text//"$work"//home/you}
   text=${text//$'\n'/ }
   text=${text//|/\\|}
-  sed -E -e 's/graphmatch-[A-Za-z0-9]{6}/graphmatch-XXXXXX/g' -e 's/held by process [0-9]+/held by process PID/' \
+  sed -E -e 's/graphmatch-[a-z0-9]{16}/graphmatch-XXXXXX/g' -e 's/held by process [0-9]+/held by process PID/' \
     -e 's/a made-up fault on the pair [0-9]+ [0-9]+/WHAT COLMAP PRINTED/' -e 's/x{300} \.\.\./WHAT COLMAP PRINTED/' \
     -e 's/images [0-9]+ and [0-9]+/images ID and ID/' -e 's/within [0-9]\.[0-9] s/within 0.2 s/' \
     -e 's/within 60\.[0-9] s/within 60.0 s/' -e 's/ +$//' <<<"${text:--}"
@@ -341,7 +341,20 @@ fresh
 hold 'BEGIN; SELECT count(*) FROM images;'
 works 'Another program reads the database'
 let_go
-# A second graphmatch_matcher on the same database belongs here.
+fresh
+mkdir "$work/first"
+TMPDIR=$work/first FAKE_COLMAP_HELP_DELAY_MS=60000 "${run[@]}" >"$work/first.txt" 2>&1 &
+first=$!
+for _ in {1..200}; do
+  [[ ! -s $database.graphmatch ]] || break
+  sleep 0.05
+done
+piece='Another graphmatch_matcher works on this database: it holds DATABASE.graphmatch (held by process PID' \
+  says 3 'A second graphmatch_matcher works on the same database' 'let it finish; the same command goes on' \
+  "${run[@]}" --GraphMatching.lock_timeout 0.2
+kill -KILL "$first"
+wait "$first" 2>/dev/null || true
+works 'A second graphmatch_matcher was killed with -9'
 
 theme rights
 copy='get the right to write, or copy the database elsewhere'
@@ -593,9 +606,11 @@ theme options
 mend='correct the option; `graphmatch_matcher -h` lists them'
 fresh
 piece="unrecognised option '--no_such_option'" says 1 'There is no such option' "$mend" "${run[@]}" --no_such_option 1
-piece='must be a number' says 1 'A word instead of a number' "$mend" "${run[@]}" --SiftMatching.max_ratio zero
-piece='must be at least 1' says 1 'A number outside its range' "$mend" "${run[@]}" --GraphMatching.max_num_neighbors 0
-piece='must be one of auto, colmap, exact' says 1 'A word that is none of those allowed' "$mend" \
+says 1 'A word instead of a number' "$mend" "${run[@]}" --SiftMatching.max_ratio zero
+says 1 'A number outside its range' "$mend" "${run[@]}" --GraphMatching.max_num_neighbors 0
+says 1 'Two spellings of an option with different values' "$mend" "${run[@]}" --SiftMatching.max_error 4 \
+  --TwoViewGeometry.max_error 5
+says 1 'A word that is none of those allowed' "$mend" \
   "${run[@]}" --GraphMatching.matcher gpu
 piece='contradict each other' says 1 'Two options contradict each other' "$mend" "${run[@]}" \
   --GraphMatching.strategy exhaustive --GraphMatching.match_list_path "$work/protected"
@@ -611,7 +626,7 @@ printf '[SiftMatching]\nthis is no option\n' >"$work/wrong.ini"
 piece='this is no option' says 1 'A line of the project file cannot be understood' "$project" \
   "${run[@]}" --project_path "$work/wrong.ini"
 printf '[SiftMatching]\nmax_ratio=zero\n' >"$work/wrong.ini"
-piece='must be a number' says 1 'A value in the project file is wrong' "$project" \
+piece='it must be a number greater than 0' says 1 'A value in the project file is wrong' "$project" \
   "${run[@]}" --project_path "$work/wrong.ini"
 list=(--GraphMatching.match_list_path "$work/pairs.txt")
 names='correct the list'
@@ -626,6 +641,9 @@ echo 'place0/photo 0.jpg place0/photo 1.jpg' >>"$work/pairs.txt"
 says 0 'Some lines of the list name no image of the database' 'correct the list and run it again' \
   "${run[@]}" "${list[@]}"
 [[ $(wc -l <"$work/pairs.after") == 2 ]] || fail 'not one pair was tested'
+
+says 5 'The list of images that look for partners is missing' "$names" "${run[@]}" \
+  --VocabTreeMatching.match_list_path "$work/images.txt"
 
 theme output
 works_with() {

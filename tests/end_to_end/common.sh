@@ -6,6 +6,8 @@ build=$1
 work=$2
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 matcher=$build/colmap_graphmatch/graphmatch_matcher
+# The COLMAP that spelling and extract ask: the installed one, unless a test has another for them.
+colmap=colmap
 rm -rf "$work"
 mkdir -p "$work"
 
@@ -23,19 +25,19 @@ expect_exit() {
   grep -q -F -- "$text" "$work/output.txt" || { cat "$work/output.txt"; fail "no '$text': $*"; }
 }
 
-# spelling COMMAND OPTION: what the installed COLMAP calls an option, e.g. --SiftMatching.use_gpu.
+# spelling COMMAND OPTION: what COLMAP calls an option, e.g. --SiftMatching.use_gpu.
 spelling() {
   local options
-  options=$(colmap "$1" -h 2>&1)
+  options=$("$colmap" "$1" -h 2>&1)
   grep -o -m 1 -E -- "--[A-Za-z]+\.$2\b" <<<"$options"
 }
 
-# extract DATABASE IMAGES FEATURES SIZE: features by the installed COLMAP.
+# extract DATABASE IMAGES FEATURES SIZE [OPTION VALUE]...: features by COLMAP.
 extract() {
-  colmap feature_extractor --database_path "$1" --image_path "$2" "$(spelling feature_extractor use_gpu)" 0 \
+  "$colmap" feature_extractor --database_path "$1" --image_path "$2" "$(spelling feature_extractor use_gpu)" 0 \
     "$(spelling feature_extractor max_num_features)" "$3" \
-    "$(spelling feature_extractor max_image_size)" "$4" >"$work/extraction.log" 2>&1 ||
-    { tail -n 5 "$work/extraction.log"; fail "colmap feature_extractor"; }
+    "$(spelling feature_extractor max_image_size)" "$4" "${@:5}" >"$work/extraction.log" 2>&1 ||
+    { tail -n 5 "$work/extraction.log"; fail "$colmap feature_extractor"; }
 }
 
 # The tested pairs of a database with their outcomes, one a line.

@@ -1,7 +1,11 @@
 // The table of options against the world:
 //   option_table document            prints docs/options.md
-//   option_table check VERSION       compares the table with what `colmap vocab_tree_matcher -h` of that
-//                                    version of COLMAP printed, on the standard input; exit code 1 if they differ
+//   option_table check VERSION       compares the table with what `colmap vocab_tree_matcher -h` of
+//   that
+//                                    version of COLMAP printed, on the standard input; exit code 1
+//                                    if they differ
+
+#include "colmap_graphmatch/cli/option_table.h"
 
 #include <iostream>
 #include <iterator>
@@ -11,7 +15,6 @@
 #include <string>
 #include <vector>
 
-#include "colmap_graphmatch/cli/option_table.h"
 #include "colmap_graphmatch/cli/options.h"
 
 namespace colmap_graphmatch {
@@ -29,7 +32,8 @@ bool SameDefault(const std::string& a, const std::string& b) {
 
 int Check(const ColmapVersion& version, const std::string& help) {
   std::map<std::string, std::string> printed;  // Defaults by name.
-  static const std::regex kOption(R"(\n +(?:-h \[ )?--([A-Za-z0-9_.]+)(?: \])?(?: arg)?(?: \(=([^)]*)\))?)");
+  static const std::regex kOption(
+      R"(\n +(?:-h \[ )?--([A-Za-z0-9_.]+)(?: \])?(?: arg)?(?: \(=([^)]*)\))?)");
   for (std::sregex_iterator match(help.begin(), help.end(), kOption), end; match != end; ++match) {
     printed[(*match)[1]] = (*match)[2];
   }
@@ -71,7 +75,8 @@ int Main(const std::vector<std::string>& arguments) {
   char dot = 0;
   if (arguments.size() == 2 && arguments[0] == "check" &&
       std::istringstream(arguments[1]) >> version.major >> dot >> version.minor) {
-    const std::string help((std::istreambuf_iterator<char>(std::cin)), std::istreambuf_iterator<char>());
+    const std::string help((std::istreambuf_iterator<char>(std::cin)),
+                           std::istreambuf_iterator<char>());
     return Check(version, help);
   }
   std::cerr << "usage: option_table document | check VERSION" << std::endl;
