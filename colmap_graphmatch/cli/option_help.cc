@@ -66,6 +66,10 @@ void PrintHelp(std::ostream& stream) {
   CommandLine defaults;
   const std::vector<OptionRow> rows = MakeOptionTable(&defaults);
   for (auto row = rows.begin(); row != rows.end();) {
+    if (row->use == OptionRow::Use::kUnused) {
+      ++row;
+      continue;
+    }
     po::options_description section(row->section, kLineLength, kHelpLength);
     const std::string name = row->section;
     for (; row != rows.end() && row->section == name; ++row) {
@@ -84,6 +88,9 @@ void PrintHelp(std::ostream& stream) {
     }
     stream << section << '\n';
   }
+  stream
+      << "All other options of `colmap vocab_tree_matcher` of COLMAP 3.8 to 4.2 are accepted, too, "
+         "and have no effect.\n";
 }
 
 void PrintOptionsDocument(std::ostream& stream) {

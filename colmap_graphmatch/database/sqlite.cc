@@ -1,6 +1,7 @@
 #include "colmap_graphmatch/database/sqlite.h"
 
 #include <sqlite3.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -14,12 +15,26 @@ namespace colmap_graphmatch::sqlite {
 namespace {
 
 // Pages that refer to each other in a damaged file can keep SQLite busy for ever, so its virtual
-// machine gets no more instructions than take a second or two: fewer to prepare a statement, for
-// then it reads the schema and parses every line of it; enough in a step to fill a shard of 100,000
-// pairs.
+// machine gets no more instructions than take a second or two, and what it takes to go through the
+// file once: fewer to prepare a statement, for then it reads the schema and parses every line of
+// it; enough in a step to fill a shard of 100,000 pairs.
 constexpr int kInstructionsPerProgressCall = 100000;
 constexpr int kProgressCallsToPrepare = 5;
 constexpr int kProgressCallsToRun = 300;
+
+// A row takes some ten bytes, and some ten instructions to be looked at.
+constexpr int kInstructionsPerByte = 10;
+
+// To go through a file once. What counts is what it takes of the disk: its size can be made up.
+int ProgressCallsToScan(const std::filesystem::path& path) {
+  struct stat status = {};
+  if (::stat(path.c_str(), &status) != 0) return 0;
+  constexpr std::int64_t kBytesPerBlock = 512;  // POSIX leaves it open; Linux does not.
+  const std::int64_t bytes =
+      std::min<std::int64_t>(status.st_size, status.st_blocks * kBytesPerBlock);
+  const std::int64_t calls = bytes / (kInstructionsPerProgressCall / kInstructionsPerByte);
+  return static_cast<int>(std::min<std::int64_t>(calls, std::numeric_limits<int>::max() / 4));
+}
 
 int CountProgressCall(void* num_calls_left) { return --*static_cast<int*>(num_calls_left) < 0; }
 
@@ -74,6 +89,7 @@ Connection::Connection(const std::filesystem::path& path, Access access,
       lockable_path_(path),
       lock_timeout_seconds_(lock_timeout_seconds),
       progress_calls_left_(std::make_unique<int>(kProgressCallsToPrepare)),
+      progress_calls_to_run_(kProgressCallsToRun + ProgressCallsToScan(path)),
       db_(nullptr, &sqlite3_close) {
   const int mode = access == Access::kRead        ? SQLITE_OPEN_READONLY
                    : access == Access::kReadWrite ? SQLITE_OPEN_READWRITE
@@ -101,7 +117,7 @@ Connection::Connection(const std::filesystem::path& path, Access access,
 }
 
 void Connection::Execute(const std::string& sql) {
-  *progress_calls_left_ = kProgressCallsToRun;
+  *progress_calls_left_ = progress_calls_to_run_;
   if (sqlite3_exec(db_.get(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
     Throw("run \"" + sql.substr(0, 60) + "\"");
   }
@@ -110,6 +126,7 @@ void Connection::Execute(const std::string& sql) {
 void Connection::AttachReadOnly(const std::filesystem::path& path, const std::string& schema) {
   Statement attach(*this, "ATTACH ?1 AS " + schema);
   attach.Bind(1, ReadOnlyUri(path)).Run();
+  progress_calls_to_run_ += ProgressCallsToScan(path);
   lockable_path_ = path;
 }
 
@@ -196,7 +213,7 @@ Statement& Statement::BindNull(int parameter) {
 }
 
 bool Statement::Step() {
-  *connection_->progress_calls_left_ = kProgressCallsToRun;
+  *connection_->progress_calls_left_ = connection_->progress_calls_to_run_;
   switch (sqlite3_step(statement_.get())) {
     case SQLITE_ROW:
       return true;

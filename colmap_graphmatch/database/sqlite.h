@@ -62,6 +62,7 @@ class Connection {
   std::filesystem::path lockable_path_;  // The file that other programs may have locked.
   double lock_timeout_seconds_;
   std::unique_ptr<int> progress_calls_left_;  // Of the call under way; SQLite has its address.
+  int progress_calls_to_run_;
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> db_;
 };
 

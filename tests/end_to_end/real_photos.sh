@@ -125,6 +125,23 @@ expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/disturbed.db"
 check "$work/disturbed.db"
 content "$work/disturbed.db" | cmp - "$work/undisturbed.content" || fail "another result after a disturbance"
 
+echo "== Five photos come to a matched database"
+added='image_id % 8 = 5'
+cp "$work/features.db" "$work/grown.db"
+sqlite3 "$work/grown.db" "PRAGMA foreign_keys = ON; DELETE FROM images WHERE $added"
+"$matcher" --database_path "$work/grown.db" >"$work/output.txt" 2>&1 || { cat "$work/output.txt"; fail "the first run"; }
+before=$(count_tested "$work/grown.db")
+sqlite3 "$work/grown.db" "ATTACH '$work/features.db' AS all_features;
+  INSERT INTO images SELECT * FROM all_features.images WHERE $added;
+  INSERT INTO keypoints SELECT * FROM all_features.keypoints WHERE $added;
+  INSERT INTO descriptors SELECT * FROM all_features.descriptors WHERE $added"
+expect_exit 0 'those of 36 images are from the last run' "$matcher" --database_path "$work/grown.db"
+check "$work/grown.db"
+of_old=$(sqlite3 "$work/grown.db" "SELECT count(*) FROM two_view_geometries
+  WHERE pair_id / 2147483647 % 8 != 5 AND pair_id % 2147483647 % 8 != 5")
+echo "$before pairs before, $(count_tested "$work/grown.db") after, $((of_old - before)) of the new ones of old photos alone"
+((of_old - before <= 20)) || fail "$((of_old - before)) more pairs of photos that were matched already"
+
 echo "== All pairs, interrupted: the same as undisturbed"
 cp "$work/features.db" "$work/exhaustive.db"
 "$matcher" --database_path "$work/exhaustive.db" --GraphMatching.strategy exhaustive >"$work/exhaustive.txt" 2>&1
