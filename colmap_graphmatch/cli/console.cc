@@ -79,12 +79,12 @@ void Console::ClearProgress() {
 
 void Console::OnInfo(const std::string& message) {
   ClearProgress();
-  Print(message + "\n");
+  Print(WithoutControlCharacters(message) + "\n");
 }
 
 void Console::OnWarning(const std::string& message) {
   ClearProgress();
-  Print("Warning: " + message + "\n");
+  Print("Warning: " + WithoutControlCharacters(message) + "\n");
 }
 
 void Console::OnProgress(const LoopProgress& progress) {
@@ -107,6 +107,15 @@ void Console::OnProgress(const LoopProgress& progress) {
   } else {
     Print(line + "\n");
   }
+}
+
+std::string WithoutControlCharacters(std::string text) {
+  const auto is_control = [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte < ' ' && c != '\n' && c != '\t') || byte == 0x7F;
+  };
+  std::replace_if(text.begin(), text.end(), is_control, '?');
+  return text;
 }
 
 std::string FormatDuration(double seconds) {

@@ -37,6 +37,10 @@ class Console : public PipelineObserver {
   bool matching_ = false;
 };
 
+// With '?' in their place, but for line ends and tabs. Names from a database could otherwise give
+// orders to the terminal.
+std::string WithoutControlCharacters(std::string text);
+
 // "12 s", "3.4 min", "5.1 h".
 std::string FormatDuration(double seconds);
 

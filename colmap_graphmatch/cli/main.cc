@@ -74,7 +74,7 @@ int Run(const CommandLine& line) {
 
 int Main(int argc, const char* const* argv) {
   const auto fail = [](const char* message, ExitCode code) {
-    std::cerr << "Error: " << message << std::endl;
+    std::cerr << "Error: " << WithoutControlCharacters(message) << std::endl;
     return code;
   };
   try {

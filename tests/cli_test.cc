@@ -1,5 +1,3 @@
-#include "colmap_graphmatch/cli/options.h"
-
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -8,7 +6,9 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/cli/console.h"
 #include "colmap_graphmatch/cli/option_table.h"
+#include "colmap_graphmatch/cli/options.h"
 #include "tests/support/synthetic_database.h"
 
 namespace colmap_graphmatch {
@@ -165,6 +165,11 @@ TEST(Options, ErrorsNameTheOptionAsItWasGiven) {
             "--GraphMatching.strategy is \"x\"; it must be one of exhaustive, graphmatch.");
   EXPECT_THAT(ErrorOf({"--GraphMatching.strategy"}), HasSubstr("GraphMatching.strategy"));
   EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("\"stray\" on the command line belongs to no option"));
+}
+
+TEST(Console, NamesGiveNoOrdersToTheTerminal) {
+  EXPECT_EQ(WithoutControlCharacters("a \"\x1b[2J\x07\x7f\r\" b\n\tc \xc3\xa9"),
+            "a \"?[2J???\" b\n\tc \xc3\xa9");
 }
 
 class ProjectTest : public ::testing::Test {
