@@ -62,6 +62,8 @@ TEST(OptionTable, EveryRowTakesItsDefaultAndRefusesWhatItMustNotBe) {
                             row.values == "0 or 1";
     if (!is_checked) continue;
     for (const char* text : {"", "-2", "x", "1e999", "nan", "1 2", "0x"}) {
+      // COLMAP takes all numbers below 1 for all cores.
+      if (row.name == "FeatureMatching.num_threads" && text == std::string("-2")) continue;
       EXPECT_FALSE(row.read(text)) << row.name << " \"" << text << "\"";
     }
   }
@@ -85,7 +87,8 @@ TEST(Options, EverySpellingOfAnOptionMeansTheSame) {
     const CommandLine line =
         Parse({prefix + ".max_error", "3", prefix + ".max_ratio", "0.7", prefix + ".num_threads",
                "2", prefix + ".use_gpu", "false", prefix + ".min_num_inliers", "20"});
-    EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "3")));
+    EXPECT_THAT(line.pipeline.verification.colmap_options,
+                ElementsAre(Pair("TwoViewGeometry.max_error", "3")));
     EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
     EXPECT_EQ(line.pipeline.num_threads, 2);
     EXPECT_FALSE(line.pipeline.verification.use_gpu);
@@ -120,9 +123,25 @@ TEST(Options, OfTheVocabularyTreeThatHaveAMeaningHere) {
       HasSubstr("give one of them"));
 }
 
+TEST(Options, TakeTheValuesThatColmapTakes) {
+  for (const char* word : {"True", "FALSE", "Yes", "oFF", "1"}) {
+    EXPECT_EQ(ErrorOf({"--SiftMatching.use_gpu", word}), "no error") << word;
+  }
+  EXPECT_EQ(ErrorOf({"--SiftMatching.use_gpu", "True", "--FeatureMatching.use_gpu", "1"}),
+            "no error");
+  EXPECT_EQ(Parse({"--SiftMatching.num_threads", "0"}).pipeline.num_threads, -1);
+  EXPECT_EQ(Parse({"--SiftMatching.num_threads", "-7"}).pipeline.num_threads, -1);
+  EXPECT_EQ(ErrorOf({"--SiftMatching.min_num_inliers", "0"}), "no error");
+  // COLMAP would refuse these, shard by shard.
+  EXPECT_THAT(ErrorOf({"--SiftMatching.max_error", "0"}), HasSubstr("greater than 0"));
+  EXPECT_THAT(ErrorOf({"--SiftMatching.max_num_trials", "10"}), HasSubstr("at least 30"));
+  EXPECT_THAT(ErrorOf({"--SiftMatching.confidence", "1.5"}), HasSubstr("from 0 to 1"));
+}
+
 TEST(Options, WithoutMeaningAreSaidOnce) {
-  const CommandLine line = Parse({"--VocabTreeMatching.vocab_tree_path", "tree.bin",
-                                  "--VocabTreeMatching.num_checks", "64", "--log_level", "0"});
+  const CommandLine line =
+      Parse({"--VocabTreeMatching.vocab_tree_path", "tree.bin", "--VocabTreeMatching.num_checks",
+             "64", "--log_level", "0", "--log_level", "0"});
   EXPECT_THAT(
       line.unused_options,
       ElementsAre(HasSubstr("--VocabTreeMatching.vocab_tree_path has no effect here: there is"),
@@ -135,7 +154,11 @@ TEST(Options, SeedsReachColmapToo) {
   EXPECT_EQ(line.pipeline.seed, 3U);
   EXPECT_THAT(line.pipeline.verification.colmap_options,
               ElementsAre(Pair("default_random_seed", "3")));
-  EXPECT_THAT(ErrorOf({"--random_seed", "-1"}), HasSubstr("an integer of at least 0"));
+  EXPECT_THAT(ErrorOf({"--random_seed", "-2"}), HasSubstr("an integer of at least 0"));
+  const CommandLine clock = Parse({"--default_random_seed", "-1"});
+  EXPECT_NE(clock.pipeline.seed, Parse({"--default_random_seed", "-1"}).pipeline.seed);
+  EXPECT_THAT(clock.pipeline.verification.colmap_options,
+              ElementsAre(Pair("default_random_seed", "-1")));
 }
 
 TEST(Options, LightGlueIsColmaps) {
@@ -143,7 +166,8 @@ TEST(Options, LightGlueIsColmaps) {
             ColmapVerifierOptions::Matcher::kAuto);
   const CommandLine line = Parse({"--FeatureMatching.type", "SIFT_LIGHTGLUE"});
   EXPECT_EQ(line.pipeline.verification.matcher, ColmapVerifierOptions::Matcher::kColmap);
-  EXPECT_THAT(line.pipeline.verification.colmap_options, Contains(Pair("type", "SIFT_LIGHTGLUE")));
+  EXPECT_THAT(line.pipeline.verification.colmap_options,
+              Contains(Pair("FeatureMatching.type", "SIFT_LIGHTGLUE")));
   EXPECT_THAT(
       ErrorOf({"--FeatureMatching.type", "SIFT_LIGHTGLUE", "--GraphMatching.matcher", "exact"}),
       HasSubstr("contradict"));
@@ -154,6 +178,10 @@ TEST(Options, LightGlueIsColmaps) {
 TEST(Options, TheNearestNameIsSuggested) {
   EXPECT_THAT(ErrorOf({"--SiftMatching.maxratio", "0.8"}),
               HasSubstr("Did you mean --SiftMatching.max_ratio?"));
+  EXPECT_THAT(ErrorOf({"--VocabTreeMatching.num_imagse", "8"}),
+              HasSubstr("Did you mean --VocabTreeMatching.num_images?"));
+  EXPECT_THAT(ErrorOf({"--VocabTreeMatching.vocab_tree_paht", "x"}),
+              HasSubstr("Did you mean --VocabTreeMatching.vocab_tree_path?"));
   EXPECT_THAT(ErrorOf({"--GraphMatching.max_neighbors", "8"}),
               HasSubstr("Did you mean --GraphMatching.max_num_neighbors?"));
 }
@@ -188,12 +216,14 @@ TEST_F(ProjectTest, TheCommandLineGoesBeforeInAnySpelling) {
       "[SiftMatching]\nmax_error=3\nmax_ratio=0.7\n[VocabTreeMatching]\nnum_images=30\n"
       "vocab_tree_path=\n[Mapper]\nmin_num_matches=x\n");
   CommandLine line = Parse(arguments);
-  EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "3")));
+  EXPECT_THAT(line.pipeline.verification.colmap_options,
+              ElementsAre(Pair("TwoViewGeometry.max_error", "3")));
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 30);
   arguments.insert(arguments.end(),
                    {"--TwoViewGeometry.max_error", "5", "--GraphMatching.max_num_neighbors", "40"});
   line = Parse(arguments);
-  EXPECT_THAT(line.pipeline.verification.colmap_options, ElementsAre(Pair("max_error", "5")));
+  EXPECT_THAT(line.pipeline.verification.colmap_options,
+              ElementsAre(Pair("TwoViewGeometry.max_error", "5")));
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 40);
   EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
 }
@@ -205,6 +235,13 @@ TEST_F(ProjectTest, DefaultsWithoutMeaningAreNotMentioned) {
       IsEmpty());
   EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_checks=65\n")).unused_options,
               ElementsAre(HasSubstr("num_checks")));
+}
+
+TEST_F(ProjectTest, UnknownNamesInGroupsOfMatchingAreMentioned) {
+  const std::string text = "[SiftMatching]\nmax_ratioo=0.5\n[Mapper]\nno_such_option=1\n";
+  EXPECT_THAT(Parse(Project(text)).unused_options,
+              ElementsAre(HasSubstr("unknown option SiftMatching.max_ratioo. Did you mean "
+                                    "--SiftMatching.max_ratio?")));
 }
 
 TEST_F(ProjectTest, ErrorsNameTheFile) {

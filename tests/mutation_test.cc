@@ -282,6 +282,7 @@ class Mutation : public ::testing::Test {
     options.vectors.num_training_descriptors = 200;
     options.vectors.max_num_features = 30;
     options.verification.lock_timeout = 1;
+    options.skip_image_pairs_in_same_frame = true;
     options.verification.timeout_per_pair = 2;
     if (mode % 3 == 1) options.strategy = PipelineOptions::Strategy::kExhaustive;
     if (mode % 4 == 1) options.verification.matcher = ColmapVerifierOptions::Matcher::kColmap;
@@ -536,9 +537,9 @@ INSTANTIATE_TEST_SUITE_P(Part, MutatedBytes, ::testing::Range(0, kNumParts));
 TEST_F(Mutation, TablesWithoutEnd) {
   for (const int page_size : {512, 4096}) {
     for (const char* table : {"sqlite_schema", "cameras", "images", "keypoints", "descriptors",
-                              "matches", "two_view_geometries"}) {
+                              "matches", "two_view_geometries", "frame_data"}) {
       for (const int depth : {1, 12}) {
-        Begin(0, page_size);
+        Begin(table == std::string("frame_data") ? 2 : 0, page_size);
         const std::vector<std::string> root = RawDatabase(path_).Query(
             "SELECT rootpage FROM sqlite_schema WHERE type = 'table' AND "
             "name = '" +
@@ -717,6 +718,17 @@ std::vector<std::string> Statements() {
         "sqlite_schema WHERE name = 'descriptors') WHERE name = '" +
         table + "'");
   }
+  for (const char* definition :
+       {"TABLE frame_data(data_id, frame_id, sensor_type AS (length(hex(zeroblob(490000000))) * "
+        "0))",
+        "TABLE frame_data(data_id INTEGER, frame_id INTEGER)",
+        "TABLE frame_data(data_id, frame_id, sensor_type)",
+        "TABLE frame_data(data_id INTEGER PRIMARY KEY, frame_id, sensor_type) WITHOUT ROWID"}) {
+    list.push_back("DROP TABLE IF EXISTS frame_data; CREATE " + std::string(definition) +
+                   "; INSERT INTO frame_data(data_id, frame_id) VALUES(1, 'x'), (2, -1)");
+  }
+  list.push_back(std::string("DROP TABLE IF EXISTS frame_data; CREATE VIEW frame_data") +
+                 kEndlessView);
   // Rows without keys, whose joins would have 10^9 rows and more.
   std::string many;
   for (const std::string table : {"images", "keypoints", "descriptors"}) {

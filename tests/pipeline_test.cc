@@ -1,13 +1,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <boost/crc.hpp>
+#include <chrono>
 #include <fstream>
+#include <limits>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/pipeline/pair_list.h"
+#include "colmap_graphmatch/pipeline/run_state.h"
 #include "tests/support/synthetic_database.h"
 
 namespace colmap_graphmatch {
@@ -15,6 +20,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 class PairListTest : public ::testing::Test {
  protected:
@@ -97,6 +103,95 @@ TEST(PipelineOptions, AListAndAnotherStrategyContradictEachOther) {
   options.Check();
   options.strategy = PipelineOptions::Strategy::kExhaustive;
   EXPECT_THROW(options.Check(), OptionsError);
+}
+
+class RunStateTest : public ::testing::Test {
+ protected:
+  RunState Open(double lock_timeout = 1) {
+    const auto warn = [this](const std::string& text) { warnings_.push_back(text); };
+    RunState state(database_, lock_timeout, stop_, warn, warn);
+    ImageVectorOptions options;
+    options.gmm.num_components = 2;
+    state.Select(options, {{1, 11}, {2, 22}, {3, 33}});
+    return state;
+  }
+
+  static GaussianMixture Mixture(Eigen::Index num_components, Eigen::Index dim) {
+    GaussianMixture mixture;
+    mixture.weights = Eigen::VectorXd::Constant(num_components, 0.5);
+    mixture.means = RowMatrixXd::Constant(num_components, dim, 0.1);
+    mixture.variances = RowMatrixXd::Constant(num_components, dim, 0.2);
+    return mixture;
+  }
+
+  // What the next run finds of a mixture that was kept with two vectors of three.
+  bool IsFound(const GaussianMixture& mixture) {
+    {
+      RunState state = Open();
+      state.KeepMixture(mixture);
+      state.KeepVectors({0, 2}, 4, std::vector<float>(8, 1).data());
+    }
+    return Open().ReadMixture().has_value();
+  }
+
+  TestDirectory directory_;
+  std::filesystem::path database_ = directory_.Path() / "database.db";
+  StopRequest stop_;
+  std::vector<std::string> warnings_;
+};
+
+TEST_F(RunStateTest, AMixtureIsKeptWhileHalfOfTheImagesHaveAVector) {
+  const GaussianMixture mixture = Mixture(2, kDescriptorDim);
+  EXPECT_TRUE(IsFound(mixture));
+  {
+    RunState state = Open();
+    EXPECT_EQ(state.ReadMixture()->means, mixture.means);
+    std::vector<float> vectors(12);
+    EXPECT_THAT(state.ReadVectors(4, vectors.data()), ElementsAre(true, false, true));
+    state.KeepMixture(mixture);
+    state.KeepVectors({1}, 4, vectors.data());
+  }
+  EXPECT_FALSE(Open().ReadMixture().has_value());
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(RunStateTest, WhatCannotBeAMixtureIsNotTakenForOne) {
+  EXPECT_TRUE(IsFound(Mixture(1, kDescriptorDim)));
+  EXPECT_FALSE(IsFound(Mixture(3, kDescriptorDim)));
+  EXPECT_FALSE(IsFound(Mixture(2, kDescriptorDim / 2)));
+  for (const double value : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    GaussianMixture mixture = Mixture(2, kDescriptorDim);
+    mixture.variances(1, 5) = value;
+    EXPECT_FALSE(IsFound(mixture)) << value;
+  }
+  // As large as no machine's memory.
+  const std::int64_t shape[] = {std::int64_t{1} << 20, std::int64_t{1} << 20};
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(shape);
+  sqlite::Connection connection(StateFile::PathFor(database_), sqlite::Access::kReadWrite, 1);
+  sqlite::Statement update(connection, "UPDATE mixture SET data = ?1, checksum = ?2");
+  boost::crc_32_type crc;
+  crc.process_bytes(shape, sizeof(shape));
+  const sqlite::Blob blob(bytes, bytes + sizeof(shape));
+  update.Bind(1, blob).Bind(2, std::int64_t{crc.checksum()}).Run();
+  EXPECT_FALSE(Open().ReadMixture().has_value());
+}
+
+TEST_F(RunStateTest, SeedsBelongToALoop) {
+  { Open().KeepSeeds("loop", {ImagePair(1, 2)}); }
+  EXPECT_THAT(Open().ReadSeeds("loop"), ElementsAre(ImagePair(1, 2)));
+  EXPECT_THAT(Open().ReadSeeds("another loop"), IsEmpty());
+}
+
+TEST_F(RunStateTest, WaitingEndsWhenAskedTo) {
+  const RunState first = Open();
+  EXPECT_THROW(Open(0.3), DatabaseLockedError);
+  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("waiting for it")));
+  std::thread stopper([this] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    stop_.Raise();
+  });
+  EXPECT_THROW(Open(1000), StoppedError);
+  stopper.join();
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "colmap_graphmatch/database/state_file.h"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -56,7 +57,7 @@ class StateFileTest : public ::testing::Test {
     for (std::size_t i = 0; i < vectors.size(); ++i) {
       EXPECT_EQ(vectors[i], found.vectors[i / kDim] ? vectors_[i] : 0);
     }
-    found.num_seeds = state.ReadSeeds("run").size();
+    found.num_seeds = state.ReadSeeds("run").value_or(std::vector<ImagePair>()).size();
     return found;
   }
 
@@ -73,7 +74,9 @@ TEST_F(StateFileTest, KeepsWhatItIsGiven) {
   EXPECT_THAT(found.vectors, ElementsAre(true, true, true));
   StateFile state(path_, 1);
   EXPECT_EQ(*state.ReadMixture("key"), (sqlite::Blob{1, 2, 3}));
-  EXPECT_THAT(state.ReadSeeds("run"), ElementsAre(ImagePair(1, 2), ImagePair(2, 3)));
+  EXPECT_THAT(*state.ReadSeeds("run"), ElementsAre(ImagePair(1, 2), ImagePair(2, 3)));
+  state.WriteSeeds("run", {});
+  EXPECT_THAT(*state.ReadSeeds("run"), IsEmpty());
   EXPECT_EQ(state.CountVectors(images_), 3U);
 }
 
@@ -81,7 +84,7 @@ TEST_F(StateFileTest, GivesNothingForOtherKeysOrFeatures) {
   WriteAll();
   StateFile state(path_, 1);
   EXPECT_FALSE(state.ReadMixture("another").has_value());
-  EXPECT_THAT(state.ReadSeeds("another"), IsEmpty());
+  EXPECT_FALSE(state.ReadSeeds("another").has_value());
   images_[1].features += 1;
   EXPECT_EQ(state.CountVectors(images_), 2U);
   std::vector<float> vectors(vectors_.size());
@@ -100,10 +103,41 @@ TEST_F(StateFileTest, DamagedRowsAreAsIfTheyWereNotThere) {
   WriteAll();
   Execute("UPDATE vectors SET data = zeroblob(length(data)) WHERE image_id = 2");
   Execute("UPDATE mixture SET data = x'010204'");
+  Execute("DELETE FROM seeds WHERE pair_id = (SELECT max(pair_id) FROM seeds)");
   const Found found = ReadAll();
   EXPECT_FALSE(found.mixture);
   EXPECT_THAT(found.vectors, ElementsAre(true, false, true));
-  EXPECT_EQ(found.num_seeds, 2U);
+  EXPECT_EQ(found.num_seeds, 0U);
+}
+
+TEST_F(StateFileTest, DropsVectorsOfImagesThatAreGone) {
+  WriteAll();
+  StateFile state(path_, 1);
+  state.DropVectorsExcept({images_[0], images_[2], {99, 1}});
+  std::vector<float> vectors(vectors_.size());
+  EXPECT_THAT(state.ReadVectors(images_, kDim, vectors.data()), ElementsAre(true, false, true));
+}
+
+TEST_F(StateFileTest, MadeAnewItStaysTheSameFileForThoseThatWait) {
+  const auto inode = [&] {
+    struct stat status = {};
+    EXPECT_EQ(::stat(path_.c_str(), &status), 0);
+    return status.st_ino;
+  };
+  for (const bool damaged : {false, true}) {
+    WriteAll();
+    const ino_t before = inode();
+    if (damaged) {
+      std::fstream file(path_);
+      file.seekp(100);
+      file << std::string(500, 'x');
+    } else {
+      Execute("PRAGMA user_version = 999");
+    }
+    const StateFile state(path_, 1);
+    EXPECT_EQ(inode(), before);
+    EXPECT_THROW(StateFile(path_, 0), DatabaseLockedError);
+  }
 }
 
 TEST_F(StateFileTest, OfAnotherVersionOrWithoutItsTablesItIsMadeAnew) {
@@ -127,7 +161,11 @@ TEST_F(StateFileTest, WithDamagedPagesItIsMadeAnewOrReadAsFarAsItIsWhole) {
     file.seekp(offset);
     file.write("\xFF\xFF\xFF\xFF", 4);
     file.close();
-    ReadAll();
+    try {
+      ReadAll();
+    } catch (const sqlite::DamagedFileError&) {
+      StateFile(path_, 1).MakeAnew();
+    }
     WriteAll();
     EXPECT_THAT(ReadAll().vectors, ElementsAre(true, true, true));
   }

@@ -256,16 +256,15 @@ TEST_F(VerifierTest, OptionsAreSpeltAsTheInstalledColmapSpellsThem) {
   Set("FAKE_COLMAP_SCHEMA", "42");
   Set("FAKE_COLMAP_GROUP", "FeatureMatching");
   options_.exact.matching.max_ratio = 0.7;
-  options_.colmap_options = {{"max_error", "3"}};
+  options_.colmap_options = {{"SiftMatching.max_error", "3"}};
   options_.min_num_inliers = 18;
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("--FeatureMatching.max_ratio=0.7"),
                                     HasSubstr("--FeatureMatching.use_gpu=0"),
                                     HasSubstr("--FeatureMatching.num_threads=1"),
                                     HasSubstr("--FeatureMatching.min_num_inliers=18"))));
-  EXPECT_THAT(warnings_,
-              ElementsAre(HasSubstr(
-                  "COLMAP 4.2.1 does not have these options, which have no effect: max_error.")));
+  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("COLMAP 4.2.1 does not have these options, which "
+                                               "have no effect: SiftMatching.max_error.")));
 }
 
 TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {

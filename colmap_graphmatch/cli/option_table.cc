@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <boost/lexical_cast.hpp>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -51,17 +51,6 @@ std::optional<T> Number(const std::string& text) {
                                                              : std::nullopt;
 }
 
-// As COLMAP reads them: Boost.Program_options' own words for truth.
-std::optional<bool> Bool(const std::string& text) {
-  for (const char* word : {"1", "true", "yes", "on"}) {
-    if (text == word) return true;
-  }
-  for (const char* word : {"0", "false", "no", "off"}) {
-    if (text == word) return false;
-  }
-  return std::nullopt;
-}
-
 std::string Text(double value) { return fmt::format("{}", value); }
 
 // What an option may be, in words and as a function that stores it.
@@ -77,26 +66,40 @@ Value Flag(bool* field) {
 
 Value BoolOf(bool* field) {
   return {"0 or 1", *field ? "1" : "0", [field](const std::string& text) {
-            const std::optional<bool> value = Bool(text);
+            const std::optional<bool> value = ParseBool(text);
             if (value) *field = *value;
             return value.has_value();
           }};
 }
 
-Value IntOf(int* field, int minimum, const std::string& special = "") {
-  return {"an integer of at least " + std::to_string(minimum) + special, std::to_string(*field),
-          [field, minimum, special](const std::string& text) {
+Value IntOf(int* field, int minimum) {
+  return {"an integer of at least " + std::to_string(minimum), std::to_string(*field),
+          [field, minimum](const std::string& text) {
             const std::optional<int> value = Number<int>(text);
-            const bool is_special = value == -1 && !special.empty();
-            if (!value || (*value < minimum && !is_special)) return false;
+            if (!value || *value < minimum) return false;
             *field = *value;
             return true;
           }};
 }
 
-Value SeedOf(std::uint64_t* field) {
-  return {"an integer of at least 0", std::to_string(*field), [field](const std::string& text) {
-            // lexical_cast takes -1 for the greatest number.
+// COLMAP takes every number below 1 for all cores.
+Value NumThreadsOf(int* field) {
+  return {"an integer; below 1: all cores", std::to_string(*field),
+          [field](const std::string& text) {
+            const std::optional<int> value = Number<int>(text);
+            if (value) *field = std::max(*value, 0) == 0 ? -1 : *value;
+            return value.has_value();
+          }};
+}
+
+// COLMAP takes -1 for a seed from the clock.
+Value SeedOf(CommandLine* line) {
+  std::uint64_t* field = &line->pipeline.seed;
+  return {"an integer of at least 0, or -1: another one in every run", std::to_string(*field),
+          [line, field](const std::string& text) {
+            line->seed_from_clock = text == "-1";
+            if (line->seed_from_clock) return true;
+            // lexical_cast takes -2 for a great number.
             const std::optional<std::uint64_t> value = Number<std::uint64_t>(text);
             if (!value || text.find('-') != std::string::npos) return false;
             *field = *value;
@@ -208,9 +211,8 @@ class Table {
                          const std::function<bool(std::string*)>& check, const std::string& values,
                          const std::string& help) {
     const std::string& name = colmap.back().name.empty() ? colmap.front().name : colmap.back().name;
-    const std::string key = name.substr(name.find('.') + 1);
     std::map<std::string, std::string>* options = &line_->pipeline.verification.colmap_options;
-    const Value value = {values, "", [options, key, check](const std::string& text) {
+    const Value value = {values, "", [options, key = name, check](const std::string& text) {
                            std::string checked = text;
                            if (!check(&checked)) return false;
                            (*options)[key] = checked;
@@ -221,7 +223,7 @@ class Table {
 
   OptionRow& PassBool(std::vector<ColmapSpelling> colmap, const std::string& help) {
     const auto check = [](std::string* text) {
-      const std::optional<bool> value = Bool(*text);
+      const std::optional<bool> value = ParseBool(*text);
       if (value) *text = *value ? "1" : "0";
       return value.has_value();
     };
@@ -237,16 +239,21 @@ class Table {
                        "an integer of at least " + std::to_string(minimum), help);
   }
 
-  OptionRow& PassDouble(std::vector<ColmapSpelling> colmap, double maximum,
-                        const std::string& help) {
-    const auto check = [maximum](std::string* text) {
+  // From 0 to 1.
+  OptionRow& PassShare(std::vector<ColmapSpelling> colmap, const std::string& help) {
+    const auto check = [](std::string* text) {
       const std::optional<double> value = Number<double>(*text);
-      return value && *value >= 0 && *value <= maximum;
+      return value && *value >= 0 && *value <= 1;
     };
-    const bool bounded = std::isfinite(maximum);
-    return AddPassedOn(std::move(colmap), check,
-                       bounded ? "a number from 0 to " + Text(maximum) : "a number of at least 0",
-                       help);
+    return AddPassedOn(std::move(colmap), check, "a number from 0 to 1", help);
+  }
+
+  OptionRow& PassPixels(std::vector<ColmapSpelling> colmap, const std::string& help) {
+    const auto check = [](std::string* text) {
+      const std::optional<double> value = Number<double>(*text);
+      return value && std::isfinite(*value) && *value > 0;
+    };
+    return AddPassedOn(std::move(colmap), check, "a number greater than 0", help);
   }
 
   OptionRow& PassText(std::vector<ColmapSpelling> colmap, const std::string& help) {
@@ -284,9 +291,11 @@ void Table::AddGeneral() {
             "an ini file with options, as COLMAP writes it; the command line goes before");
   Add("colmap_path", TextOf(&p.colmap_path, "a path, or a name on PATH"),
       "the COLMAP program: a path, or a name on PATH");
-  AddColmap(Use::kHere, {{{3, 8}, "random_seed", "0"}, {{3, 13}, "default_random_seed", "0"}},
-            SeedOf(&p.seed),
-            "seed (>= 0) of this program's random choices, and handed on to COLMAP");
+  AddColmap(
+      Use::kHere, {{{3, 8}, "random_seed", "0"}, {{3, 13}, "default_random_seed", "0"}},
+      SeedOf(line_),
+      "seed (>= 0) of this program's random choices, and handed on to COLMAP; -1: another one "
+      "in every run");
 }
 
 void Table::AddGraph() {
@@ -379,7 +388,6 @@ void Table::AddWork() {
 void Table::AddColmapMatching() {
   PipelineOptions& p = line_->pipeline;
   DescriptorMatchingOptions& matching = p.verification.exact.matching;
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Section(
       "COLMAP's options of matching and verification, accepted in each of the groups "
       "SiftMatching, TwoViewGeometry and FeatureMatching");
@@ -391,8 +399,7 @@ void Table::AddColmapMatching() {
   AddGrouped(
       Use::kHere,
       {{{3, 8}, "SiftMatching.num_threads", "-1"}, {{3, 13}, "FeatureMatching.num_threads", "-1"}},
-      IntOf(&p.num_threads, 1, ", or -1 for all cores"),
-      "cores to use at a time, COLMAP's included; -1: all");
+      NumThreadsOf(&p.num_threads), "cores to use at a time, COLMAP's included; below 1: all");
   AddGrouped(Use::kHere,
              {{{3, 13}, "FeatureMatching.type", "SIFT"},
               {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},
@@ -420,19 +427,19 @@ void Table::AddColmapMatching() {
   AddGrouped(Use::kHere,
              {{{3, 8}, "SiftMatching.min_num_inliers", "15"},
               {{3, 9}, "TwoViewGeometry.min_num_inliers", "15"}},
-             IntOf(&p.verification.min_num_inliers, 1), "inliers that make a pair an edge");
-  PassDouble({{{3, 8}, "SiftMatching.max_error", "4"}, {{3, 9}, "TwoViewGeometry.max_error", "4"}},
-             kInfinity, "greatest epipolar error of an inlier, in pixels");
-  PassDouble({{{3, 8}, "SiftMatching.confidence", "0.999"},
-              {{3, 9}, "TwoViewGeometry.confidence", "0.999"}},
-             1, "confidence of RANSAC");
+             IntOf(&p.verification.min_num_inliers, 0), "inliers that make a pair an edge");
+  PassPixels({{{3, 8}, "SiftMatching.max_error", "4"}, {{3, 9}, "TwoViewGeometry.max_error", "4"}},
+             "greatest epipolar error of an inlier, in pixels");
+  PassShare({{{3, 8}, "SiftMatching.confidence", "0.999"},
+             {{3, 9}, "TwoViewGeometry.confidence", "0.999"}},
+            "confidence of RANSAC");
   PassInt({{{3, 8}, "SiftMatching.max_num_trials", "10000"},
            {{3, 9}, "TwoViewGeometry.max_num_trials", "10000"}},
-          1, "trials of RANSAC at most");
-  PassDouble({{{3, 8}, "SiftMatching.min_inlier_ratio", "0.25"},
-              {{3, 9}, "TwoViewGeometry.min_inlier_ratio", "0.25"},
-              {{4, 2}, "TwoViewGeometry.min_inlier_ratio", "0"}},
-             1, "inlier ratio that RANSAC counts on");
+          30, "trials of RANSAC at most");
+  PassShare({{{3, 8}, "SiftMatching.min_inlier_ratio", "0.25"},
+             {{3, 9}, "TwoViewGeometry.min_inlier_ratio", "0.25"},
+             {{4, 2}, "TwoViewGeometry.min_inlier_ratio", "0"}},
+            "inlier ratio that RANSAC counts on");
   PassBool({{{3, 8}, "SiftMatching.multiple_models", "0"},
             {{3, 9}, "TwoViewGeometry.multiple_models", "0"}},
            "look for several motions in a pair");
@@ -446,11 +453,11 @@ void Table::AddColmapMatching() {
            "mark pairs that only a watermark links");
   PassBool({{{3, 13}, "TwoViewGeometry.multiple_ignore_watermark", "1"}},
            "leave watermarks out of several motions");
-  PassDouble({{{3, 13}, "TwoViewGeometry.watermark_detection_max_error", "4"}}, kInfinity,
+  PassPixels({{{3, 13}, "TwoViewGeometry.watermark_detection_max_error", "4"}},
              "greatest error of a watermark's inlier, in pixels");
   PassBool({{{3, 13}, "TwoViewGeometry.filter_stationary_matches", "0"}},
            "drop matches at the same place in both images");
-  PassDouble({{{3, 13}, "TwoViewGeometry.stationary_matches_max_error", "4"}}, kInfinity,
+  PassPixels({{{3, 13}, "TwoViewGeometry.stationary_matches_max_error", "4"}},
              "what the same place means, in pixels");
   PassInt({{{3, 13}, "TwoViewGeometry.random_seed", "-1"}}, -1,
           "seed of RANSAC, the same for every pair; -1: of the thread");
@@ -459,8 +466,7 @@ void Table::AddColmapMatching() {
   AddGrouped(Use::kHere, {{{4, 0}, "FeatureMatching.skip_image_pairs_in_same_frame", "0"}},
              BoolOf(&p.skip_image_pairs_in_same_frame),
              "do not test pairs of images that a rig took at the same time");
-  PassDouble({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, 1,
-             "score of a match by LightGlue");
+  PassShare({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, "score of a match by LightGlue");
   PassText({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, "the model of LightGlue");
 }
 
@@ -520,6 +526,18 @@ void Table::AddUnusedOptions() {
 }
 
 }  // namespace
+
+std::optional<bool> ParseBool(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* word : {"1", "true", "yes", "on"}) {
+    if (text == word) return true;
+  }
+  for (const char* word : {"0", "false", "no", "off"}) {
+    if (text == word) return false;
+  }
+  return std::nullopt;
+}
 
 const ColmapSpelling* OptionRow::In(const ColmapVersion& version) const {
   const ColmapSpelling* found = nullptr;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -56,6 +57,10 @@ struct OptionRow {
   // The spelling and default in a version of COLMAP, or null if it has no such option.
   const ColmapSpelling* In(const ColmapVersion& version) const;
 };
+
+// The words for truth that COLMAP understands, in any case (Boost.Program_options' own): true, yes,
+// on, 1 and their opposites.
+std::optional<bool> ParseBool(std::string text);
 
 // The table. Its rows store what they read in `line`, which must outlive them; defaults are those
 // of `line` as it is now.

@@ -9,7 +9,10 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
+#include <random>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -41,12 +44,9 @@ std::size_t EditDistance(const std::string& a, const std::string& b) {
 // Whether two texts are the same value: 4 and 4.0, 1 and true.
 bool SameValue(const std::string& a, const std::string& b) {
   if (a == b) return true;
-  static const std::map<std::string, bool> kBools = {
-      {"1", true},  {"true", true},   {"yes", true}, {"on", true},
-      {"0", false}, {"false", false}, {"no", false}, {"off", false}};
-  const auto bool_a = kBools.find(a);
-  const auto bool_b = kBools.find(b);
-  if (bool_a != kBools.end() && bool_b != kBools.end()) return bool_a->second == bool_b->second;
+  const std::optional<bool> bool_a = ParseBool(a);
+  const std::optional<bool> bool_b = ParseBool(b);
+  if (bool_a && bool_b) return *bool_a == *bool_b;
   double number_a = 0;
   double number_b = 0;
   return boost::conversion::try_lexical_convert(a, number_a) &&
@@ -107,9 +107,12 @@ class Parser {
             "each other: COLMAP alone has LightGlue. Give one of them.");
       }
       p.verification.matcher = ColmapVerifierOptions::Matcher::kColmap;
-      p.verification.colmap_options["type"] = "SIFT_LIGHTGLUE";
+      p.verification.colmap_options["FeatureMatching.type"] = "SIFT_LIGHTGLUE";
     }
-    if (p.seed != 0) {
+    if (line_->seed_from_clock) {
+      p.seed = std::random_device()();
+      p.verification.colmap_options["default_random_seed"] = "-1";
+    } else if (p.seed != 0) {
       // COLMAP's seed is an int.
       p.verification.colmap_options["default_random_seed"] =
           std::to_string(p.seed % (std::uint64_t{1} << 31U));
@@ -145,8 +148,8 @@ class Parser {
     }
     for (const Given& option : given) {
       const OptionRow& row = *by_name_.at(option.name);
-      on_command_line_.insert(&row);
-      if (row.use == OptionRow::Use::kUnused) SayUnused(option.name, row);
+      const bool is_first = on_command_line_.insert(&row).second;
+      if (row.use == OptionRow::Use::kUnused && is_first) SayUnused(option.name, row);
     }
     Store(given, "");
   }
@@ -170,9 +173,15 @@ class Parser {
     for (const po::option& option : parsed.options) {
       const auto row = by_name_.find(option.string_key);
       if (row == by_name_.end()) {
-        if (option.string_key.rfind("GraphMatching.", 0) != 0) continue;
-        throw OptionsError("The project file " + path + " has the unknown option " +
-                           option.string_key + ". " + Suggest(option.string_key));
+        const std::string group = option.string_key.substr(0, option.string_key.find('.'));
+        const std::string problem = "The project file " + path + " has the unknown option " +
+                                    option.string_key + ". " + Suggest(option.string_key);
+        if (group == "GraphMatching") throw OptionsError(problem);
+        // It may be one of a newer COLMAP.
+        static const std::set<std::string> kMatchingGroups = {
+            "SiftMatching", "TwoViewGeometry", "FeatureMatching", "VocabTreeMatching"};
+        if (kMatchingGroups.count(group) > 0) line_->unused_options.push_back(problem);
+        continue;
       }
       const std::string value = option.value.empty() ? "" : option.value.front();
       // COLMAP writes options without a value, too.
@@ -214,19 +223,21 @@ class Parser {
   }
 
   // The option whose name takes the fewest insertions, deletions and replacements of a letter
-  // (Levenshtein). The group counts only between equals: COLMAP's options moved between them.
+  // (Levenshtein); of names that differ in the group alone the one that the help shows: COLMAP's
+  // options moved between groups.
   std::string Suggest(const std::string& unknown) const {
     const std::string given =
         unknown.substr(std::min(unknown.find_first_not_of('-'), unknown.size()));
-    std::pair<std::size_t, std::size_t> least(std::numeric_limits<std::size_t>::max(), 0);
+    std::tuple<std::size_t, bool, std::size_t> least(std::numeric_limits<std::size_t>::max(), true,
+                                                     0);
     std::string nearest;
-    for (const OptionRow& row : rows_) {
-      if (row.use == OptionRow::Use::kUnused) continue;
-      const std::pair<std::size_t, std::size_t> distance(
-          EditDistance(WithoutGroup(given), WithoutGroup(row.name)), EditDistance(given, row.name));
+    for (const auto& [name, row] : by_name_) {
+      const std::tuple<std::size_t, bool, std::size_t> distance(
+          EditDistance(WithoutGroup(given), WithoutGroup(name)), name != row->name,
+          EditDistance(given, name));
       if (distance >= least) continue;
       least = distance;
-      nearest = row.name;
+      nearest = name;
     }
     return "Did you mean --" + nearest + "? " + kSeeHelp;
   }

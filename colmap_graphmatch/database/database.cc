@@ -394,11 +394,21 @@ std::vector<ImageFingerprint> Database::ReadFingerprints(const std::vector<Image
 
 std::map<ImageId, std::uint32_t> Database::ReadFrames() {
   std::map<ImageId, std::uint32_t> frames;
-  if (connection_.Columns("frame_data").empty()) return frames;
-  // SensorType::CAMERA in COLMAP (src/colmap/sensor/rig.h, `sensor_t`) is 0.
+  // Without what is computed when it is read.
+  const std::vector<std::string> columns = connection_.Columns("frame_data");
+  if (columns.empty()) return frames;
+  for (const char* column : {"data_id", "frame_id", "sensor_type"}) {
+    if (!Contains(columns, column)) {
+      ThrowNotColmaps(std::string("its table frame_data has no column ") + column);
+    }
+  }
+  // SensorType::CAMERA in COLMAP (src/colmap/util/types.h) is 0.
   sqlite::Statement select(connection_,
-                           "SELECT data_id, frame_id FROM frame_data WHERE sensor_type = 0");
+                           "SELECT data_id, frame_id, rowid FROM frame_data WHERE sensor_type = 0 "
+                           "ORDER BY rowid");
+  AscendingKeys keys;
   while (select.Step()) {
+    if (!keys.Add(select.Int(2))) ThrowDamaged("the rows of frame_data do not ascend");
     frames[static_cast<ImageId>(select.Int(0))] = static_cast<std::uint32_t>(select.Int(1));
   }
   return frames;

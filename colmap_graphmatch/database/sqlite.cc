@@ -38,6 +38,18 @@ int ProgressCallsToScan(const std::filesystem::path& path) {
 
 int CountProgressCall(void* num_calls_left) { return --*static_cast<int*>(num_calls_left) < 0; }
 
+// Nothing in a file is longer than the file, and nothing that is added to it longer than this.
+constexpr std::int64_t kMaxAddedLength = std::int64_t{64} << 20;
+
+void LimitLength(sqlite3* db, const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  constexpr std::uintmax_t kMost = 1'000'000'000;  // SQLite's own default.
+  const auto length = static_cast<int>(std::min((error ? 0 : size) + kMaxAddedLength, kMost));
+  const int before = sqlite3_limit(db, SQLITE_LIMIT_LENGTH, -1);
+  if (length != before) sqlite3_limit(db, SQLITE_LIMIT_LENGTH, length);
+}
+
 // SQLite's advice for files from strangers (https://www.sqlite.org/security.html). COLMAP's
 // databases have no views, triggers or virtual tables in any version; users' own do no harm as long
 // as they are not run.
@@ -111,6 +123,7 @@ Connection::Connection(const std::filesystem::path& path, Access access,
   const double milliseconds = std::clamp(1e3 * lock_timeout_seconds, 0.0, 1e9);
   sqlite3_busy_timeout(db, static_cast<int>(milliseconds));
   Harden(db);
+  LimitLength(db, path);
   sqlite3_progress_handler(db, kInstructionsPerProgressCall, &CountProgressCall,
                            progress_calls_left_.get());
   Execute("PRAGMA cell_size_check = ON; PRAGMA ignore_check_constraints = ON");
@@ -123,10 +136,21 @@ void Connection::Execute(const std::string& sql) {
   }
 }
 
+void Connection::ResetDatabase() {
+  sqlite3_db_config(db_.get(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+  sqlite3_db_config(db_.get(), SQLITE_DBCONFIG_RESET_DATABASE, 1, nullptr);
+  *progress_calls_left_ = progress_calls_to_run_;
+  const int result = sqlite3_exec(db_.get(), "VACUUM", nullptr, nullptr, nullptr);
+  sqlite3_db_config(db_.get(), SQLITE_DBCONFIG_RESET_DATABASE, 0, nullptr);
+  sqlite3_db_config(db_.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  if (result != SQLITE_OK) Throw("empty the database");
+}
+
 void Connection::AttachReadOnly(const std::filesystem::path& path, const std::string& schema) {
   Statement attach(*this, "ATTACH ?1 AS " + schema);
   attach.Bind(1, ReadOnlyUri(path)).Run();
   progress_calls_to_run_ += ProgressCallsToScan(path);
+  LimitLength(db_.get(), path);
   lockable_path_ = path;
 }
 
@@ -270,6 +294,7 @@ BlobPrefixReader::BlobPrefixReader(Connection& connection, const std::string& ta
 BlobPrefixReader::~BlobPrefixReader() { sqlite3_blob_close(blob_); }
 
 Blob BlobPrefixReader::Read(std::int64_t row, std::size_t num_bytes) {
+  *connection_->progress_calls_left_ = connection_->progress_calls_to_run_;
   const int result = blob_ == nullptr
                          ? sqlite3_blob_open(connection_->db_.get(), "main", table_.c_str(),
                                              column_.c_str(), row, 0, &blob_)

@@ -45,6 +45,9 @@ class Connection {
   // Runs statements that return no rows.
   void Execute(const std::string& sql);
 
+  // Empties the database, whatever state it is in.
+  void ResetDatabase();
+
   // Makes the tables of another database file readable (and only that) under the schema name. From
   // then on it is taken to be the one that other programs may have locked.
   void AttachReadOnly(const std::filesystem::path& path, const std::string& schema);

@@ -36,7 +36,7 @@ void CreateTables(sqlite::Connection& connection) {
   connection.Execute(
       "CREATE TABLE vectors(image_id INTEGER PRIMARY KEY NOT NULL, features INTEGER "
       "NOT NULL, checksum INTEGER NOT NULL, data BLOB NOT NULL)");
-  connection.Execute("CREATE TABLE run(key TEXT NOT NULL)");
+  connection.Execute("CREATE TABLE run(key TEXT NOT NULL, checksum INTEGER NOT NULL)");
   connection.Execute("CREATE TABLE seeds(pair_id INTEGER PRIMARY KEY NOT NULL)");
   connection.Execute("PRAGMA application_id = " + std::to_string(kApplicationId));
   connection.Execute("PRAGMA user_version = " + std::to_string(kFormatVersion));
@@ -56,17 +56,11 @@ bool HeaderIsOurs(const std::filesystem::path& path) {
   return file && id == kApplicationId;
 }
 
-// Whether the tables are there and whole. (Rows have checksums of their own.)
-bool IsIntact(sqlite::Connection& connection) {
-  try {
-    for (const char* table : {"mixture", "vectors", "run", "seeds"}) {
-      if (connection.Columns(table).empty()) return false;
-    }
-    sqlite::Statement check(connection, "PRAGMA quick_check(1)");
-    return check.Step() && check.Text(0) == "ok";
-  } catch (const DatabaseError&) {
-    return false;
+bool HasAllTables(sqlite::Connection& connection) {
+  for (const char* table : {"mixture", "vectors", "run", "seeds"}) {
+    if (connection.Columns(table).empty()) return false;
   }
+  return true;
 }
 
 enum class Content { kEmpty, kIntact, kToBeMadeAnew, kSomethingElse };
@@ -77,7 +71,23 @@ Content Examine(sqlite::Connection& connection) {
     return is_empty ? Content::kEmpty : Content::kSomethingElse;
   }
   const bool same_version = ReadNumber(connection, "PRAGMA user_version") == kFormatVersion;
-  return same_version && IsIntact(connection) ? Content::kIntact : Content::kToBeMadeAnew;
+  return same_version && HasAllTables(connection) ? Content::kIntact : Content::kToBeMadeAnew;
+}
+
+// Takes the lock, and makes the tables in an empty file.
+Content LockAndExamine(sqlite::Connection& connection) {
+  connection.Execute("PRAGMA synchronous = OFF");
+  sqlite::Transaction transaction(connection, sqlite::Transaction::Kind::kExclusive);
+  const Content content = Examine(connection);
+  if (content == Content::kEmpty) CreateTables(connection);
+  transaction.Commit();
+  return content;
+}
+
+// Empties the file in place, under its lock: another run may be waiting for it.
+void EmptyAndLock(sqlite::Connection& connection) {
+  connection.ResetDatabase();
+  LockAndExamine(connection);
 }
 
 }  // namespace
@@ -99,33 +109,35 @@ sqlite::Connection StateFile::Open(const std::filesystem::path& path, double loc
                          " is in the way: it is not a file of this program, which keeps there what "
                          "speeds up the next run. Move it, or delete it.");
   };
-  for (bool made_anew = false;; made_anew = true) {
-    Content content = Content::kToBeMadeAnew;
+  const auto open = [&] {
+    sqlite::Connection connection(path, sqlite::Access::kCreate, lock_timeout_seconds);
+    // The lock stays when a transaction ends. What is lost in a crash is only worth the time to
+    // compute it.
+    connection.Execute("PRAGMA locking_mode = EXCLUSIVE");
+    return connection;
+  };
+  try {
     try {
-      sqlite::Connection connection(path, sqlite::Access::kCreate, lock_timeout_seconds);
-      // The lock stays when a transaction ends. What is lost in a crash is only worth the time to
-      // compute it.
-      connection.Execute("PRAGMA locking_mode = EXCLUSIVE");
-      connection.Execute("PRAGMA synchronous = OFF");
-      sqlite::Transaction transaction(connection, sqlite::Transaction::Kind::kExclusive);
-      content = Examine(connection);
-      if (content == Content::kEmpty) CreateTables(connection);
-      transaction.Commit();
-      if (content == Content::kEmpty || content == Content::kIntact) return connection;
-    } catch (const DatabaseLockedError&) {
-      throw DatabaseLockedError(
-          "Another graphmatch_matcher works on this database: it holds " + path.string() + " (" +
-          DescribeLockHolders(path) +
-          "). Let it finish, or wait longer with --GraphMatching.lock_timeout.");
+      sqlite::Connection connection = open();
+      const Content content = LockAndExamine(connection);
+      if (content == Content::kSomethingElse) throw something_else();
+      if (content == Content::kToBeMadeAnew) EmptyAndLock(connection);
+      return connection;
     } catch (const sqlite::DamagedFileError&) {
       if (!HeaderIsOurs(path)) throw something_else();
     }
-    if (content == Content::kSomethingElse || made_anew) throw something_else();
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-    std::filesystem::remove(path.string() + "-journal", ignored);
+    sqlite::Connection connection = open();
+    EmptyAndLock(connection);
+    return connection;
+  } catch (const DatabaseLockedError&) {
+    throw DatabaseLockedError(
+        "Another graphmatch_matcher works on this database: it holds " + path.string() + " (" +
+        DescribeLockHolders(path) +
+        "). Let it finish, or wait longer with --GraphMatching.lock_timeout.");
   }
 }
+
+void StateFile::MakeAnew() { EmptyAndLock(connection_); }
 
 std::optional<sqlite::Blob> StateFile::ReadMixture(const std::string& key) {
   sqlite::Statement select(connection_, "SELECT data, checksum FROM mixture WHERE key = ?1");
@@ -141,6 +153,26 @@ void StateFile::WriteMixture(const std::string& key, const sqlite::Blob& mixture
   connection_.Execute("DELETE FROM vectors");
   sqlite::Statement insert(connection_, "INSERT INTO mixture VALUES(?1, ?2, ?3)");
   insert.Bind(1, key).Bind(2, Checksum(mixture.data(), mixture.size())).Bind(3, mixture).Run();
+  transaction.Commit();
+}
+
+void StateFile::DropVectorsExcept(const std::vector<ImageFingerprint>& images) {
+  std::vector<std::int64_t> others;
+  {
+    sqlite::Statement select(connection_, "SELECT image_id FROM vectors ORDER BY image_id");
+    auto image = images.begin();
+    while (select.Step()) {
+      if (!others.empty() && select.Int(0) <= others.back()) break;
+      while (image != images.end() && std::int64_t{image->id} < select.Int(0)) ++image;
+      if (image == images.end() || std::int64_t{image->id} != select.Int(0)) {
+        others.push_back(select.Int(0));
+      }
+    }
+  }
+  if (others.empty()) return;
+  sqlite::Transaction transaction(connection_);
+  sqlite::Statement drop(connection_, "DELETE FROM vectors WHERE image_id = ?1");
+  for (const std::int64_t id : others) drop.Bind(1, id).Run();
   transaction.Commit();
 }
 
@@ -190,25 +222,36 @@ void StateFile::WriteVectors(const std::vector<ImageFingerprint>& images, std::s
   transaction.Commit();
 }
 
-std::vector<ImagePair> StateFile::ReadSeeds(const std::string& key) {
-  sqlite::Statement run(connection_, "SELECT 1 FROM run WHERE key = ?1");
-  if (!run.Bind(1, key).Step()) return {};
+std::optional<std::vector<ImagePair>> StateFile::ReadSeeds(const std::string& key) {
+  sqlite::Statement run(connection_, "SELECT checksum FROM run WHERE key = ?1");
+  if (!run.Bind(1, key).Step()) return std::nullopt;
   sqlite::Statement select(connection_, "SELECT pair_id FROM seeds ORDER BY pair_id");
+  std::vector<std::int64_t> keys;
+  while (select.Step()) {
+    // What does not ascend may have no end.
+    if (!keys.empty() && select.Int(0) <= keys.back()) return std::nullopt;
+    keys.push_back(select.Int(0));
+  }
+  if (Checksum(keys.data(), keys.size() * sizeof(keys[0])) != run.Int(0)) return std::nullopt;
   std::vector<ImagePair> seeds;
-  while (select.Step()) seeds.push_back(DecodePair(static_cast<PairId>(select.Int(0))));
+  seeds.reserve(keys.size());
+  for (const std::int64_t pair_id : keys) {
+    seeds.push_back(DecodePair(static_cast<PairId>(pair_id)));
+  }
   return seeds;
 }
 
 void StateFile::WriteSeeds(const std::string& key, const std::vector<ImagePair>& seeds) {
+  std::vector<std::int64_t> keys;
+  keys.reserve(seeds.size());
+  for (const ImagePair& pair : seeds) keys.push_back(static_cast<std::int64_t>(EncodePair(pair)));
   sqlite::Transaction transaction(connection_);
   connection_.Execute("DELETE FROM run");
   connection_.Execute("DELETE FROM seeds");
-  sqlite::Statement run(connection_, "INSERT INTO run VALUES(?1)");
-  run.Bind(1, key).Run();
+  sqlite::Statement run(connection_, "INSERT INTO run VALUES(?1, ?2)");
+  run.Bind(1, key).Bind(2, Checksum(keys.data(), keys.size() * sizeof(keys[0]))).Run();
   sqlite::Statement insert(connection_, "INSERT INTO seeds VALUES(?1)");
-  for (const ImagePair& pair : seeds) {
-    insert.Bind(1, static_cast<std::int64_t>(EncodePair(pair))).Run();
-  }
+  for (const std::int64_t pair_id : keys) insert.Bind(1, pair_id).Run();
   transaction.Commit();
 }
 

@@ -15,26 +15,33 @@ namespace colmap_graphmatch {
 
 // What a run keeps beside the user's database for the next one: the mixture, the Fisher vectors and
 // the seeds of the loop, in the file DATABASE.graphmatch (docs/formats.md). The file is held locked
-// as long as the object lives, so that only one run works on a database at a time. What is damaged
-// in it is as if it were not there; it can be deleted at any time and costs only what it saves.
+// as long as the object lives, so that only one run works on a database at a time. Rows whose
+// checksum is wrong are as if they were not there.
 //
-// Errors: DatabaseError, e.g. if the file cannot be written; DatabaseLockedError if another run
-// held it for longer than the given time.
+// Errors: DatabaseError, e.g. if the file cannot be written; sqlite::DamagedFileError if SQLite
+// cannot read it any more: then MakeAnew helps. DatabaseLockedError if another run held it for
+// longer than the given time.
 class StateFile {
  public:
   // The file that belongs to a database. Links are followed: a database has one state.
   static std::filesystem::path PathFor(const std::filesystem::path& database_path);
 
-  // Opens the file or makes it; one that is damaged or of another version is made anew. Throws
-  // DatabaseError if something else is in its place.
+  // Opens the file or makes it; one that is of another version, or cannot be opened any more, is
+  // made anew. Throws DatabaseError if something else is in its place.
   StateFile(const std::filesystem::path& path, double lock_timeout_seconds);
 
   const std::filesystem::path& Path() const { return path_; }
+
+  // Empties it; the lock stays.
+  void MakeAnew();
 
   // The mixture that was stored with the same key: what it depends on. Any bytes of the caller.
   std::optional<sqlite::Blob> ReadMixture(const std::string& key);
   // Drops all vectors: they belong to another mixture.
   void WriteMixture(const std::string& key, const sqlite::Blob& mixture);
+
+  // Drops the vectors of images that are not among these, which ascend.
+  void DropVectorsExcept(const std::vector<ImageFingerprint>& images);
 
   // How many of the images have a vector that was stored for the same features.
   std::size_t CountVectors(const std::vector<ImageFingerprint>& images);
@@ -45,8 +52,8 @@ class StateFile {
   void WriteVectors(const std::vector<ImageFingerprint>& images, std::size_t dim,
                     const float* vectors);
 
-  // The seeds that were stored with the same key, ascending; none if there are no such.
-  std::vector<ImagePair> ReadSeeds(const std::string& key);
+  // The seeds that were stored with the same key, ascending.
+  std::optional<std::vector<ImagePair>> ReadSeeds(const std::string& key);
   void WriteSeeds(const std::string& key, const std::vector<ImagePair>& seeds);
 
  private:

@@ -75,7 +75,7 @@ void Sampler::ChargeTested(const MatchingGraph& graph) {
     int num_tested = 0;
     for (const Vertex other : ranking_.NearestOf(vertex)) {
       if (num_seen == budget) break;
-      if (graph.NumTestedOf(other) == 0) continue;
+      if (graph.NumTestedOf(other) == 0 || options_.restrictions.SameFrame(vertex, other)) continue;
       ++num_seen;
       num_tested += graph.IsTested(vertex, other) ? 1 : 0;
     }

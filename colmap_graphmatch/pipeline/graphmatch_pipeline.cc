@@ -219,7 +219,7 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
   database.CheckWritable();
   const auto info = [&](const std::string& message) { observer.OnInfo(message); };
   const auto warn = [&](const std::string& warning) { observer.OnWarning(warning); };
-  RunState state(options.database_path, options.verification.lock_timeout, info, warn);
+  RunState state(options.database_path, options.verification.lock_timeout, stop, info, warn);
   const std::vector<ImageRecord> images = WithFeatures(all_images);
   result.num_images = all_images.size();
   result.num_images_without_features = all_images.size() - images.size();

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/stopwatch.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -37,20 +38,22 @@ sqlite::Blob Serialize(const GaussianMixture& mixture) {
   return blob;
 }
 
-std::optional<GaussianMixture> Deserialize(const sqlite::Blob& blob) {
+// Nothing if it cannot be a mixture of at most max_num_components over SIFT descriptors.
+std::optional<GaussianMixture> Deserialize(const sqlite::Blob& blob, int max_num_components) {
   std::array<std::int64_t, 2> shape = {};
   if (blob.size() < sizeof(shape)) return std::nullopt;
   std::memcpy(shape.data(), blob.data(), sizeof(shape));
-  constexpr std::int64_t kMost = 1 << 20;
-  if (shape[0] < 1 || shape[0] > kMost || shape[1] < 1 || shape[1] > kMost) return std::nullopt;
-  GaussianMixture mixture;
-  mixture.weights.resize(shape[0]);
-  mixture.means.resize(shape[0], shape[1]);
-  mixture.variances.resize(shape[0], shape[1]);
+  if (shape[0] < 1 || shape[0] > max_num_components || shape[1] != kDescriptorDim) {
+    return std::nullopt;
+  }
   const std::int64_t num_values = shape[0] * (1 + 2 * shape[1]);
   if (blob.size() != sizeof(shape) + static_cast<std::size_t>(num_values) * sizeof(double)) {
     return std::nullopt;
   }
+  GaussianMixture mixture;
+  mixture.weights.resize(shape[0]);
+  mixture.means.resize(shape[0], shape[1]);
+  mixture.variances.resize(shape[0], shape[1]);
   const std::uint8_t* source = blob.data() + sizeof(shape);
   const auto take = [&source](auto* matrix) {
     const std::size_t size = static_cast<std::size_t>(matrix->size()) * sizeof(double);
@@ -60,7 +63,10 @@ std::optional<GaussianMixture> Deserialize(const sqlite::Blob& blob) {
   take(&mixture.weights);
   take(&mixture.means);
   take(&mixture.variances);
-  return mixture;
+  const bool is_mixture = mixture.weights.allFinite() && mixture.means.allFinite() &&
+                          mixture.variances.allFinite() && (mixture.weights.array() > 0).all() &&
+                          (mixture.variances.array() > 0).all();
+  return is_mixture ? std::optional<GaussianMixture>(std::move(mixture)) : std::nullopt;
 }
 
 std::string Checksum(const void* data, std::size_t size) {
@@ -72,16 +78,22 @@ std::string Checksum(const void* data, std::size_t size) {
 }  // namespace
 
 RunState::RunState(const std::filesystem::path& database_path, double lock_timeout_seconds,
-                   const Say& info, const Say& warn)
+                   const StopRequest& stop, const Say& info, const Say& warn)
     : warn_(warn) {
+  // SQLite's own waiting cannot be interrupted.
+  constexpr double kSecondsATry = 0.2;
   const std::filesystem::path path = StateFile::PathFor(database_path);
+  const Stopwatch waiting;
   try {
-    try {
-      file_ = std::make_unique<StateFile>(path, 0);
-    } catch (const DatabaseLockedError& error) {
-      if (lock_timeout_seconds <= 0) throw;
-      info("Another graphmatch_matcher works on this database; waiting for it.");
-      file_ = std::make_unique<StateFile>(path, lock_timeout_seconds);
+    for (bool told = false; !file_; told = true) {
+      stop.ThrowIfRequested();
+      const double left = lock_timeout_seconds - waiting.Seconds();
+      try {
+        file_ = std::make_unique<StateFile>(path, std::clamp(left, 0.0, told ? kSecondsATry : 0.0));
+      } catch (const DatabaseLockedError&) {
+        if (left <= 0) throw;
+        if (!told) info("Another graphmatch_matcher works on this database; waiting for it.");
+      }
     }
     usable_ = true;
   } catch (const DatabaseLockedError&) {
@@ -96,7 +108,13 @@ RunState::RunState(const std::filesystem::path& database_path, double lock_timeo
 void RunState::Try(const std::function<void()>& action) {
   if (!usable_) return;
   try {
-    action();
+    try {
+      action();
+    } catch (const sqlite::DamagedFileError&) {
+      warn_(file_->Path().string() +
+            " is damaged and is made anew: what the last run kept is computed again.");
+      file_->MakeAnew();
+    }
   } catch (const DatabaseError& error) {
     // The file stays open: its lock keeps other runs away.
     usable_ = false;
@@ -107,6 +125,7 @@ void RunState::Try(const std::function<void()>& action) {
 void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images) {
   images_ = std::move(images);
   const GmmOptions& gmm = options.gmm;
+  max_num_components_ = gmm.num_components;
   vectors_key_ = "components " + std::to_string(gmm.num_components) + ", tolerance " +
                  Hex(gmm.tolerance) + ", iterations " + std::to_string(gmm.max_num_iterations) +
                  ", variance floor " + Hex(gmm.variance_floor) + ", training " +
@@ -122,7 +141,7 @@ std::optional<GaussianMixture> RunState::ReadMixture() {
     if (file_->CountVectors(images_) * 2 < images_.size()) return;
     const std::optional<sqlite::Blob> blob = file_->ReadMixture(vectors_key_);
     if (!blob) return;
-    mixture = Deserialize(*blob);
+    mixture = Deserialize(*blob, max_num_components_);
     mixture_checksum_ = Checksum(blob->data(), blob->size());
   });
   return mixture;
@@ -147,7 +166,10 @@ void RunState::KeepVectors(const std::vector<std::size_t>& which, std::size_t di
   std::vector<ImageFingerprint> images;
   images.reserve(which.size());
   for (const std::size_t i : which) images.push_back(images_[i]);
-  Try([&] { file_->WriteVectors(images, dim, vectors); });
+  Try([&] {
+    file_->DropVectorsExcept(images_);
+    file_->WriteVectors(images, dim, vectors);
+  });
 }
 
 std::string RunState::SeedsKey(const std::string& loop_key) const {
@@ -161,12 +183,12 @@ std::string RunState::SeedsKey(const std::string& loop_key) const {
 }
 
 std::vector<ImagePair> RunState::ReadSeeds(const std::string& loop_key) {
-  std::vector<ImagePair> seeds;
-  Try([&] { seeds = file_->ReadSeeds(SeedsKey(loop_key)); });
-  return seeds;
+  Try([&] { kept_seeds_ = file_->ReadSeeds(SeedsKey(loop_key)); });
+  return kept_seeds_.value_or(std::vector<ImagePair>());
 }
 
 void RunState::KeepSeeds(const std::string& loop_key, const std::vector<ImagePair>& seeds) {
+  if (kept_seeds_ == seeds) return;
   Try([&] { file_->WriteSeeds(SeedsKey(loop_key), seeds); });
 }
 

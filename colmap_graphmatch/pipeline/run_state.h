@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/database/state_file.h"
@@ -22,10 +23,9 @@ class RunState {
   using Say = std::function<void(const std::string&)>;
 
   // Waits for another run on the same database, up to lock_timeout_seconds. Throws
-  // DatabaseLockedError if it is still at work then; DatabaseError if something else is in the
-  // place of the file.
-  RunState(const std::filesystem::path& database_path, double lock_timeout_seconds, const Say& info,
-           const Say& warn);
+  // DatabaseLockedError if it is still at work then; StoppedError if stop asks for it.
+  RunState(const std::filesystem::path& database_path, double lock_timeout_seconds,
+           const StopRequest& stop, const Say& info, const Say& warn);
 
   // Chooses what is kept: vectors of these images under these options.
   void Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images);
@@ -40,21 +40,23 @@ class RunState {
   // vectors: a row for each of these images, given by their places among the selected ones.
   void KeepVectors(const std::vector<std::size_t>& which, std::size_t dim, const float* vectors);
 
-  // The seeds of the loop under the same images, mixture and loop_key.
+  // The seeds of the loop under the same images, mixture and loop_key; none if there are no such.
   std::vector<ImagePair> ReadSeeds(const std::string& loop_key);
   void KeepSeeds(const std::string& loop_key, const std::vector<ImagePair>& seeds);
 
  private:
-  // Runs it, if there is a file. An error ends the use of the file.
+  // Runs it, if there is a file, which is made anew if it is damaged. Other errors end its use.
   void Try(const std::function<void()>& action);
   std::string SeedsKey(const std::string& loop_key) const;
 
   Say warn_;
   std::unique_ptr<StateFile> file_;
   bool usable_ = false;
+  int max_num_components_ = 0;
   std::string vectors_key_;
   std::string mixture_checksum_;
   std::vector<ImageFingerprint> images_;
+  std::optional<std::vector<ImagePair>> kept_seeds_;
 };
 
 }  // namespace colmap_graphmatch

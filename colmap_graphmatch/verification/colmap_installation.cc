@@ -79,8 +79,10 @@ std::string ColmapInstallation::Version() const {
 }
 
 std::string ColmapInstallation::Spelling(const std::string& option) const {
+  if (matcher_options.count(option) > 0) return option;
+  const std::string bare = option.substr(option.find('.') + 1);
   for (const char* group : {"SiftMatching.", "TwoViewGeometry.", "FeatureMatching."}) {
-    if (matcher_options.count(group + option) > 0) return group + option;
+    if (matcher_options.count(group + bare) > 0) return group + bare;
   }
   // The seed of everything random has no group, and another name before COLMAP 3.13.
   if (option == "default_random_seed") {

@@ -23,8 +23,8 @@ struct ColmapInstallation {
   std::string Version() const;
 
   // The spelling that this COLMAP has for an option of feature matching or geometric verification,
-  // e.g. "TwoViewGeometry.max_error" for "max_error", or for "default_random_seed"; empty if it has
-  // none. COLMAP moved these
+  // e.g. "TwoViewGeometry.max_error" for "max_error" or "SiftMatching.max_error", or for
+  // "default_random_seed"; empty if it has none. COLMAP moved these
   // options between the groups SiftMatching, TwoViewGeometry and FeatureMatching from version to
   // version.
   std::string Spelling(const std::string& option) const;

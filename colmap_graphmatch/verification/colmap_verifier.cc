@@ -47,6 +47,9 @@ constexpr std::size_t kMaxUnrelatedFailures = 4;
 constexpr double kPatience = 20;
 constexpr double kMinTimeoutSeconds = 30;
 
+// What COLMAP 3.13 and later match with; not for others to leave out silently.
+constexpr char kMatcherType[] = "FeatureMatching.type";
+
 // The first COLMAP that is known to store pairs with too few matches as degenerate instead of
 // undefined.
 constexpr std::pair<int, int> kFirstDegenerate(4, 2);
@@ -84,19 +87,28 @@ void AddMatchingOptions(const DescriptorMatchingOptions& matching,
   add("max_num_matches", matching.max_num_matches, defaults.max_num_matches);
 }
 
+// The value of an option, in whatever group it was given, or null.
+const std::string* FindOption(const std::map<std::string, std::string>& options,
+                              const std::string& name) {
+  for (const auto& [key, value] : options) {
+    if (key.substr(key.find('.') + 1) == name) return &value;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 void ColmapVerifierOptions::Check() const {
   EffectiveNumThreads(num_threads);
   exact.Check();
   for (const char* name : {"max_ratio", "max_distance", "cross_check", "max_num_matches"}) {
-    if (colmap_options.count(name) == 0) continue;
+    if (FindOption(colmap_options, name) == nullptr) continue;
     throw OptionsError(std::string(name) + " is an option of exact.matching.");
   }
   if (num_processes < 0) {
     throw OptionsError("The number of COLMAP processes must be positive, or 0 to have it chosen.");
   }
-  if (min_num_inliers < 1) throw OptionsError("min_num_inliers must be at least 1.");
+  if (min_num_inliers < 0) throw OptionsError("min_num_inliers must be at least 0.");
   if (max_pairs_per_shard < 1) throw OptionsError("A shard needs at least one pair.");
   if (!(timeout_per_pair > 0)) throw OptionsError("The timeout of a pair must be positive.");
   if (!(lock_timeout >= 0)) throw OptionsError("The lock timeout must not be negative.");
@@ -162,8 +174,8 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
                                        static_cast<std::size_t>(num_processes_));
     unverified_ = database.ReadUnverifiedPairs();
     // Guided matching is COLMAP's: it matches once more where the geometry says so.
-    const auto guided = options.colmap_options.find("guided_matching");
-    shards_with_descriptors_ = guided != options.colmap_options.end() && guided->second != "0";
+    const std::string* guided = FindOption(options.colmap_options, "guided_matching");
+    shards_with_descriptors_ = guided != nullptr && *guided != "0";
   }
 
   // TwoViewGeometry::ConfigurationType: undefined, or degenerate.
@@ -177,6 +189,12 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
   colmap_options["min_num_inliers"] = std::to_string(options.min_num_inliers);
   std::vector<std::string> unknown;
   arguments_ = colmap.Arguments(colmap_options, &unknown);
+  if (std::find(unknown.begin(), unknown.end(), kMatcherType) != unknown.end()) {
+    throw OptionsError("COLMAP " + colmap.Version() + " does not have --" + kMatcherType + " " +
+                       options.colmap_options.at(kMatcherType) +
+                       ": it matches SIFT features in one way only. Leave the option out, or name "
+                       "another COLMAP with --colmap_path.");
+  }
   if (!unknown.empty()) {
     std::string names;
     for (const std::string& name : unknown) names += (names.empty() ? "" : ", ") + name;

@@ -39,12 +39,13 @@ struct ColmapVerifierOptions {
   // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
   bool use_gpu = true;
 
-  // A pair is an edge with this many inliers. Also handed to COLMAP.
+  // A pair is an edge with this many inliers, 0 being as good as 1. Also handed to COLMAP.
   int min_num_inliers = 15;
 
-  // Other options of COLMAP's feature matching and geometric verification, by their names without a
-  // group (e.g. "max_error"), as COLMAP is to get them. What is not here keeps COLMAP's own
-  // default. Those of exact.matching do not belong here: COLMAP gets them from there.
+  // Other options of COLMAP's feature matching and geometric verification, by their names in any
+  // version (e.g. "SiftMatching.max_error") or without a group, as COLMAP is to get them. What is
+  // not here keeps COLMAP's own default. Those of exact.matching do not belong here: COLMAP gets
+  // them from there.
   std::map<std::string, std::string> colmap_options;
 
   // Pairs a shard at most, the amount of work that a crash of COLMAP or kill -9 can lose.

@@ -1,6 +1,7 @@
 #include "colmap_graphmatch/verification/work_directory.h"
 
 #include <fcntl.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -24,7 +25,7 @@ namespace {
 // Less free space than this explains any failure of COLMAP.
 constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
 
-// What the guard does, with standard input as its end of the pipe. Between fork and exec of a
+// What the guard does, with standard input as its end of the socket. Between fork and exec of a
 // process with threads only calls that are safe in signal handlers are allowed.
 [[noreturn]] void WatchAndRemove(const char* path) {
   // Of another session, so that what ends this process on its terminal does not end it.
@@ -35,6 +36,7 @@ constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
     ::dup2(null, STDOUT_FILENO);
     ::dup2(null, STDERR_FILENO);
   }
+  // Where old kernels and containers do not have it, what they have open stays open.
   ::close_range(3, ~0U, 0);
   char byte = 0;
   ssize_t result = 0;
@@ -82,14 +84,15 @@ WorkDirectory::WorkDirectory(const std::filesystem::path& parent, Guard guard) {
 void WorkDirectory::StartGuard() {
   std::array<int, 2> ends = {-1, -1};
   // Without a guard the directory is only left behind by kill -9.
-  if (::pipe2(ends.data(), O_CLOEXEC) != 0) return;
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) return;
   guard_ = ::fork();
   if (guard_ == 0) {
+    ::close(ends[1]);
     ::dup2(ends[0], STDIN_FILENO);
     WatchAndRemove(path_.c_str());
   }
   ::close(ends[0]);
-  guard_pipe_ = ends[1];
+  guard_socket_ = ends[1];
 }
 
 WorkDirectory::~WorkDirectory() {
@@ -99,12 +102,12 @@ WorkDirectory::~WorkDirectory() {
 }
 
 void WorkDirectory::DismissGuard() {
-  if (guard_pipe_ < 0) return;
+  if (guard_socket_ < 0) return;
   const char done = '.';
-  const bool told = ::write(guard_pipe_, &done, 1) == 1;
-  ::close(guard_pipe_);
-  guard_pipe_ = -1;
-  if (told && guard_ > 0) ::waitpid(guard_, nullptr, 0);
+  ::send(guard_socket_, &done, 1, MSG_NOSIGNAL);
+  ::close(guard_socket_);
+  guard_socket_ = -1;
+  if (guard_ > 0) ::waitpid(guard_, nullptr, 0);
 }
 
 void ThrowIfDiskIsFull(const std::filesystem::path& work_path) {

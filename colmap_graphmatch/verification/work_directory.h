@@ -27,7 +27,7 @@ class WorkDirectory {
   void DismissGuard();
 
   std::filesystem::path path_;
-  int guard_pipe_ = -1;  // The guard acts when this end is closed without a word.
+  int guard_socket_ = -1;  // The guard acts when this end is closed without a word.
   pid_t guard_ = -1;
 };
 

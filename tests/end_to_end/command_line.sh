@@ -31,7 +31,7 @@ expect_exit 1 'must be a number of at least 0' "${run[@]}" --GraphMatching.cache
 expect_exit 1 'must be a number greater than 0' "${run[@]}" --SiftMatching.max_ratio 0
 expect_exit 1 'contradict each other' "${run[@]}" --GraphMatching.strategy exhaustive \
   --GraphMatching.match_list_path "$work/pairs.txt"
-expect_exit 1 'must be an integer of at least 1, or -1 for all cores' "${run[@]}" --SiftMatching.num_threads 0
+expect_exit 1 'must be an integer; below 1: all cores' "${run[@]}" --SiftMatching.num_threads all
 
 echo "== A project file"
 cat >"$work/project.ini" <<END
@@ -41,7 +41,7 @@ database_path=$database
 [SiftMatching]
 max_ratio=0.8
 max_error=4
-num_threads=0
+num_threads=none
 [TwoViewGeometry]
 min_num_inliers=15
 [VocabTreeMatching]
@@ -50,7 +50,7 @@ vocab_tree_path=
 [Mapper]
 min_num_matches=15
 END
-expect_exit 1 'must be an integer of at least 1, or -1' "$matcher" --project_path "$work/project.ini"
+expect_exit 1 'it must be an integer; below 1' "$matcher" --project_path "$work/project.ini"
 # The command line goes before it, in any spelling.
 expect_exit 1 '--SiftMatching.max_distance is "0"; it must be a number greater than 0' "$matcher" --project_path "$work/project.ini" \
   --FeatureMatching.num_threads 2 --TwoViewGeometry.max_error 3 --SiftMatching.max_distance 0

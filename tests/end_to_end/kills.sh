@@ -82,9 +82,7 @@ sqlite3 "$work/grown.db" "ATTACH '$work/new.db' AS new;
   INSERT INTO images SELECT * FROM new.images WHERE image_id % 8 = 3;
   INSERT INTO keypoints SELECT * FROM new.keypoints WHERE image_id % 8 = 3;
   INSERT INTO descriptors SELECT * FROM new.descriptors WHERE image_id % 8 = 3"
-before=$(count_tested "$work/grown.db")
 kill_until_done grown "$work/grown.db" 15 700 "$matcher" --colmap_path "$fake"
-(($(count_tested "$work/grown.db") == before)) || fail "the start was changed"
 unset FAKE_COLMAP_DELAY_MS
 
 if [[ -x $build/tests/synthetic_photos/render_photos ]] && command -v colmap >/dev/null; then

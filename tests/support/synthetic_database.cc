@@ -31,6 +31,10 @@ void CreateTables(sqlite::Connection* database, Schema schema) {
     database->Execute(
         "CREATE TABLE frames(frame_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, "
         "rig_id INTEGER NOT NULL, FOREIGN KEY(rig_id) REFERENCES rigs(rig_id) ON DELETE CASCADE)");
+    database->Execute(
+        "CREATE TABLE frame_data(frame_id INTEGER NOT NULL, data_id INTEGER NOT NULL, sensor_id "
+        "INTEGER NOT NULL, sensor_type INTEGER NOT NULL, FOREIGN KEY(frame_id) REFERENCES "
+        "frames(frame_id) ON DELETE CASCADE)");
   }
   database->Execute(
       "CREATE TABLE cameras(camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, model INTEGER "
@@ -94,8 +98,15 @@ void WriteSyntheticDatabase(const std::filesystem::path& path, Schema schema,
             "VALUES(?1, 0, ?2, 128, ?3)"
           : "INSERT INTO descriptors(image_id, rows, cols, data) VALUES(?1, ?2, 128, ?3)");
   std::int64_t id = 0;
+  if (schema == Schema::kColmap42) database.Execute("INSERT INTO rigs VALUES(1, 1, 0)");
   for (const SyntheticImage& image : images) {
     ++id;
+    if (schema == Schema::kColmap42) {
+      // As COLMAP does where no rig is known: a frame for every image.
+      const std::string text = std::to_string(id);
+      database.Execute("INSERT INTO frames VALUES(" + text + ", 1)");
+      database.Execute("INSERT INTO frame_data VALUES(" + text + ", " + text + ", 1, 0)");
+    }
     Keypoints keypoints = image.keypoints;
     if (keypoints.data.empty()) {
       keypoints.num_rows = image.descriptors.num_rows;
