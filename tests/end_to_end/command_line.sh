@@ -269,9 +269,4 @@ for signal in INT TERM KILL INT KILL KILL HUP; do
 done
 
 echo "== Nothing is left behind, after kill -9 neither"
-for _ in {1..100}; do
-  left=$(find "$TMPDIR" -mindepth 1 -maxdepth 1 | wc -l)
-  ((left > 0)) || break
-  sleep 0.1
-done
-((left == 0)) || { ls -la "$TMPDIR"; fail "files in TMPDIR"; }
+expect_empty "$TMPDIR"

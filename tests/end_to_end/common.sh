@@ -54,3 +54,14 @@ check_integrity() {
                          (SELECT pair_id FROM matches)')
   [[ $lonely == 0 ]] || fail "$1 has $lonely geometries without matches"
 }
+
+# expect_empty DIRECTORY: the runs that used it have left nothing there. The guards of killed ones get a moment.
+expect_empty() {
+  local left
+  for _ in {1..100}; do
+    left=$(find "$1" -mindepth 1 -maxdepth 1)
+    [[ -n $left ]] || return 0
+    sleep 0.1
+  done
+  fail "left behind: $left"
+}

@@ -98,10 +98,4 @@ fi
 echo "$total kills survived"
 
 echo "== Nothing is left behind"
-# The guards of killed runs get a moment.
-for _ in {1..100}; do
-  left=$(find "$TMPDIR" -mindepth 1 -maxdepth 1 | wc -l)
-  ((left > 0)) || break
-  sleep 0.1
-done
-((left == 0)) || { ls -la "$TMPDIR"; fail "files in TMPDIR"; }
+expect_empty "$TMPDIR"
