@@ -14,6 +14,7 @@
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/listed_pairs.h"
 #include "colmap_graphmatch/graph/propagation.h"
+#include "colmap_graphmatch/graph/retrieval.h"
 #include "colmap_graphmatch/graph/sampling.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
 #include "tests/support/recording_verifier.h"
@@ -790,6 +791,119 @@ TEST(Loop, NeedsAnIdForEveryImage) {
   ThreadPool threads(1);
   EXPECT_THROW(RunGraphMatch({}, ranking, {1, 2}, verifier, threads, nullptr), OptionsError);
   EXPECT_THROW(RunGraphMatch({}, ranking, {4, 3, 2, 1}, verifier, threads, nullptr), OptionsError);
+}
+
+// Retrieval and query expansion as the paper says it, pair by pair.
+std::vector<std::set<ImagePair>> ReferenceRetrieval(const RetrievalOptions& options,
+                                                    const Ranking& ranking, const Scene& scene) {
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  std::set<VertexPair> tested;
+  std::vector<std::set<ImagePair>> batches;
+  const auto test = [&](const std::set<VertexPair>& pairs) {
+    tested.insert(pairs.begin(), pairs.end());
+    batches.emplace_back();
+    for (const auto& [a, b] : pairs) batches.back().emplace(ids[a], ids[b]);
+  };
+  std::set<VertexPair> pairs;
+  for (Vertex a = 0; a < scene.num_vertices; ++a) {
+    const std::vector<Vertex> all = ranking.AllOf(a);
+    for (std::size_t i = 0; i < std::min<std::size_t>(all.size(), options.num_images); ++i) {
+      pairs.insert(MakeVertexPair(a, all[i]));
+    }
+  }
+  test(pairs);
+  for (int round = 0; round < options.num_expansions; ++round) {
+    const auto is_found = [&](Vertex a, Vertex b) {
+      return tested.count(MakeVertexPair(a, b)) > 0 && scene.edges.count(MakeVertexPair(a, b)) > 0;
+    };
+    pairs.clear();
+    for (Vertex i = 0; i < scene.num_vertices; ++i) {
+      for (Vertex k = i + 1; k < scene.num_vertices; ++k) {
+        for (Vertex j = 0; j < scene.num_vertices; ++j) {
+          if (j == i || j == k || !is_found(i, j) || !is_found(j, k)) continue;
+          if (tested.count({i, k}) == 0) pairs.emplace(i, k);
+        }
+      }
+    }
+    if (pairs.empty()) break;
+    test(pairs);
+  }
+  return batches;
+}
+
+TEST(Retrieval, TestsTheNearestImagesAndThenNeighborsOfNeighbors) {
+  const Scene scene = MakeScene(5, 12, 3, 0.6, 31);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  for (const std::size_t list_length : {3, 512}) {
+    const Ranking ranking = MakeRanking(scene, list_length);
+    for (const int num_images : {1, 4, 1000}) {
+      for (const int num_expansions : {0, 2, 50}) {
+        RetrievalOptions options;
+        options.num_images = num_images;
+        options.num_expansions = num_expansions;
+        ThreadPool threads(2);
+        RecordingVerifier verifier(ImageEdges(scene, ids));
+        const GraphMatchResult result =
+            RunRetrieval(options, ranking, ids, verifier, threads, nullptr);
+        const auto expected = ReferenceRetrieval(options, ranking, scene);
+        EXPECT_EQ(AsSets(verifier.batches), expected) << num_images << " " << num_expansions;
+        EXPECT_EQ(result.retrieval.num_tested, expected.front().size());
+        EXPECT_EQ(result.All().num_tested, verifier.tested.size());
+      }
+    }
+  }
+}
+
+TEST(Retrieval, GoesOnAfterAnInterruption) {
+  const Scene scene = MakeScene(5, 12, 3, 0.6, 32);
+  const Ranking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  ThreadPool threads(2);
+  RetrievalOptions options;
+  options.num_images = 3;
+  options.num_expansions = 4;
+  RecordingVerifier whole(ImageEdges(scene, ids));
+  const GraphMatchResult expected = RunRetrieval(options, ranking, ids, whole, threads, nullptr);
+  ASSERT_GT(expected.expansion.num_tested, 10U);
+  for (std::size_t stop_after = 0; stop_after < whole.tested.size(); stop_after += 37) {
+    RecordingVerifier first(ImageEdges(scene, ids));
+    first.stop_after = stop_after;
+    EXPECT_FALSE(RunRetrieval(options, ranking, ids, first, threads, nullptr).finished);
+    RecordingVerifier second(ImageEdges(scene, ids));
+    second.known.insert(first.tested.begin(), first.tested.end());
+    const GraphMatchResult result = RunRetrieval(options, ranking, ids, second, threads, nullptr);
+    EXPECT_EQ(result.graph.Edges(), expected.graph.Edges());
+    EXPECT_EQ(first.tested.size() + second.tested.size(), whole.tested.size());
+  }
+}
+
+TEST(Retrieval, KeepsToItsRestrictions) {
+  const Scene scene = MakeScene(3, 12, 11, 0.4, 33);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  ThreadPool threads(2);
+  RetrievalOptions options;
+  options.num_images = 4;
+  options.num_expansions = 4;
+  options.restrictions.seeking.resize(scene.num_vertices);
+  options.restrictions.seeking[7] = true;
+  options.restrictions.frames.resize(scene.num_vertices);
+  options.restrictions.frames[7] = options.restrictions.frames[8] = 5;
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  RunRetrieval(options, MakeRanking(scene), ids, verifier, threads, nullptr);
+  EXPECT_GE(verifier.tested.size(), 3U);
+  for (const ImagePair& pair : verifier.tested) {
+    EXPECT_TRUE(pair.id1 == ids[7] || pair.id2 == ids[7]);
+    EXPECT_NE(pair, ImagePair(ids[7], ids[8]));
+  }
+}
+
+TEST(Retrieval, RefusesOptionsThatMeanNothing) {
+  RetrievalOptions options;
+  options.num_images = 0;
+  EXPECT_THROW(options.Check(), OptionsError);
+  options.num_images = 1;
+  options.num_expansions = -1;
+  EXPECT_THROW(options.Check(), OptionsError);
 }
 
 TEST(ListedPairs, AllPairsOfTheImagesInBlocks) {

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 namespace colmap_graphmatch {
 namespace {
@@ -126,12 +128,15 @@ std::string FormatDuration(double seconds) {
 
 std::string FormatProgress(const LoopProgress& progress, double seconds_of_matching) {
   const StageStatistics& all = progress.all;
-  const std::string stage = progress.stage == LoopStage::kListed     ? "matching"
-                            : progress.stage == LoopStage::kSampling ? "sampling"
-                                                                     : "propagation";
-  std::string line = progress.stage == LoopStage::kListed
-                         ? stage
-                         : fmt::format("{} {}", stage, progress.iteration + 1);
+  static const std::map<LoopStage, const char*> kNames = {
+      {LoopStage::kSampling, "sampling"},   {LoopStage::kPropagation, "propagation"},
+      {LoopStage::kListed, "matching"},     {LoopStage::kRetrieval, "retrieval"},
+      {LoopStage::kExpansion, "expansion"},
+  };
+  std::string line = kNames.at(progress.stage);
+  const bool repeats =
+      progress.stage != LoopStage::kListed && progress.stage != LoopStage::kRetrieval;
+  if (repeats) line += fmt::format(" {}", progress.iteration + 1);
   line += fmt::format(": {} tested", all.num_tested);
   if (all.num_tested > 0 && seconds_of_matching > 1) {
     const double rate = static_cast<double>(all.num_tested) / seconds_of_matching;
@@ -164,11 +169,13 @@ std::string FormatSummary(const PipelineResult& result) {
     text += fmt::format("Already there      {} pairs{}, {} edges\n", matching.num_seed_pairs,
                         listed ? " that are not listed" : "", matching.num_seed_edges);
   }
-  if (!listed) {
-    text += FormatStage("sampling", matching.sampling);
-    text += FormatStage("propagation", matching.propagation);
+  for (const auto& [name, stage] : {std::make_pair("sampling", matching.sampling),
+                                    std::make_pair("propagation", matching.propagation),
+                                    std::make_pair("retrieval", matching.retrieval),
+                                    std::make_pair("expansion", matching.expansion)}) {
+    if (stage.num_tested + stage.num_failed + stage.num_known > 0) text += FormatStage(name, stage);
   }
-  text += FormatStage(listed ? "all" : "both", all);
+  text += FormatStage("all", all);
   if (all.num_tested + all.num_failed == 0 && matching.finished) {
     text += "  Nothing is left to test with these options.\n";
   }

@@ -32,6 +32,10 @@ const Names<GraphMatchOptions::PropagationDistance> kDistances = {
     {"neighbor", GraphMatchOptions::PropagationDistance::kNeighbor}};
 const Names<PipelineOptions::Strategy> kStrategies = {
     {"graphmatch", PipelineOptions::Strategy::kGraphMatch},
+    {"sampling", PipelineOptions::Strategy::kSampling},
+    {"propagation", PipelineOptions::Strategy::kPropagation},
+    {"retrieval", PipelineOptions::Strategy::kRetrieval},
+    {"briad", PipelineOptions::Strategy::kBriad},
     {"exhaustive", PipelineOptions::Strategy::kExhaustive}};
 const Names<ColmapVerifierOptions::Matcher> kMatchers = {
     {"auto", ColmapVerifierOptions::Matcher::kAuto},
@@ -302,7 +306,10 @@ void Table::AddGraph() {
   PipelineOptions& p = line_->pipeline;
   Section("GraphMatch: which pairs are tested");
   Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategies),
-      "which pairs are tested: those that graphmatch finds, or exhaustive: all");
+      "which pairs are tested: those that graphmatch finds; for comparison sampling or propagation "
+      "(after one sampling) alone, retrieval: the nearest images of each, briad: retrieval and "
+      "query "
+      "expansion; exhaustive: all");
   Add("GraphMatching.match_list_path", TextOf(&p.match_list_path, "the path of a list of pairs"),
       "a file of image pairs to be tested instead, two names a line");
   AddColmap(Use::kHere, {{{3, 8}, "VocabTreeMatching.match_list_path", ""}},
@@ -323,6 +330,10 @@ void Table::AddGraph() {
   AddName("VocabTreeMatching.num_images", &neighbors);
   Add("GraphMatching.num_to_propagate", IntOf(&p.graph.num_to_propagate, 0),
       "images (>= 0) that each neighbour hands on to an image in an iteration");
+  Add("GraphMatching.num_retrieved_images", IntOf(&p.num_retrieved_images, 0),
+      "images (>= 1) that retrieval and briad test each image with; 0: 120, and 40 for briad");
+  Add("GraphMatching.num_expansions", IntOf(&p.num_expansions, 0),
+      "rounds (>= 0) of query expansion by briad");
   Add("GraphMatching.sampling_schedule", OneOf(&p.graph.sampling_schedule, kSchedules),
       "tests an iteration: budget / iterations as floor, round, or carry (spends it all)");
   Add("GraphMatching.count_incoming_tests", BoolOf(&p.graph.count_incoming_tests),

@@ -67,6 +67,10 @@ StageStatistics& GraphBuilder::Total(LoopStage stage) {
       return result_.sampling;
     case LoopStage::kPropagation:
       return result_.propagation;
+    case LoopStage::kRetrieval:
+      return result_.retrieval;
+    case LoopStage::kExpansion:
+      return result_.expansion;
     case LoopStage::kListed:
       break;
   }

@@ -13,8 +13,9 @@
 
 namespace colmap_graphmatch {
 
-// kListed: the pairs were given beforehand (see listed_pairs.h).
-enum class LoopStage { kSampling, kPropagation, kListed };
+// kSampling, kPropagation: of the loop. kListed: the pairs were given beforehand (listed_pairs.h).
+// kRetrieval, kExpansion: see retrieval.h.
+enum class LoopStage { kSampling, kPropagation, kListed, kRetrieval, kExpansion };
 
 struct StageStatistics {
   std::size_t num_tested = 0;  // Pairs that the verifier tested in this run.
@@ -57,6 +58,8 @@ struct GraphMatchResult {
   StageStatistics sampling;
   StageStatistics propagation;
   StageStatistics listed;
+  StageStatistics retrieval;
+  StageStatistics expansion;
   // Pairs that were in the database before the run and that the loop did not ask for itself.
   std::size_t num_seed_pairs = 0;
   std::size_t num_seed_edges = 0;
@@ -66,7 +69,7 @@ struct GraphMatchResult {
   std::vector<ImagePair> failed_pairs;
   bool finished = true;  // False if the verifier was asked to stop.
 
-  StageStatistics All() const { return sampling + propagation + listed; }
+  StageStatistics All() const { return sampling + propagation + listed + retrieval + expansion; }
 };
 
 // Finds out which known pairs have to be part of the graph from the start, so that what earlier

@@ -147,6 +147,30 @@ std::string LoopKey(const PipelineOptions& options, const GraphMatchOptions& gra
   return key + ", restrictions " + std::to_string(restrictions.checksum());
 }
 
+bool RetrievesOnce(PipelineOptions::Strategy strategy) {
+  return strategy == PipelineOptions::Strategy::kRetrieval ||
+         strategy == PipelineOptions::Strategy::kBriad;
+}
+
+RetrievalOptions MakeRetrievalOptions(const PipelineOptions& options) {
+  const bool expands = options.strategy == PipelineOptions::Strategy::kBriad;
+  RetrievalOptions retrieval;
+  retrieval.num_images = options.num_retrieved_images > 0 ? options.num_retrieved_images
+                         : expands                        ? 40
+                                                          : 120;
+  retrieval.num_expansions = expands ? options.num_expansions : 0;
+  return retrieval;
+}
+
+GraphMatchOptions MakeGraphOptions(const PipelineOptions& options) {
+  GraphMatchOptions graph = options.graph;
+  if (options.strategy == PipelineOptions::Strategy::kSampling) graph.num_to_propagate = 0;
+  if (options.strategy == PipelineOptions::Strategy::kPropagation) {
+    graph.number_sample_iterations = std::min(graph.number_sample_iterations, 1);
+  }
+  return graph;
+}
+
 template <typename List>
 void WarnOfSkippedLines(const List& list, const std::filesystem::path& path,
                         const std::string& what, PipelineObserver& observer) {
@@ -192,8 +216,8 @@ std::vector<ImagePair> ReadListedPairs(const std::filesystem::path& path,
 void PipelineOptions::Check() const {
   if (!match_list_path.empty() && strategy != Strategy::kGraphMatch) {
     throw OptionsError(
-        "--GraphMatching.match_list_path and --GraphMatching.strategy exhaustive contradict each "
-        "other: give one of them.");
+        "--GraphMatching.match_list_path and --GraphMatching.strategy contradict each other: give "
+        "one of them.");
   }
   if (!match_list_path.empty() && !image_list_path.empty()) {
     throw OptionsError(
@@ -201,6 +225,11 @@ void PipelineOptions::Check() const {
         "that look for partners: give one of them.");
   }
   EffectiveNumThreads(num_threads);
+  if (num_retrieved_images < 0) {
+    throw OptionsError("num_retrieved_images is " + std::to_string(num_retrieved_images) +
+                       "; it must be positive, or 0 to have it chosen.");
+  }
+  MakeRetrievalOptions(*this).Check();
   vectors.Check();
   graph.Check();
   verification.Check();
@@ -265,10 +294,15 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
   } else {
     const Ranking ranking =
         RankImages(options, database, images, state, threads, stop, observer, &result);
-    GraphMatchOptions graph = options.graph;
-    graph.restrictions = restrictions;
+    const std::vector<ImageId> ids = Ids(images);
     result.matching = Timed(&result.matching_seconds, [&] {
-      const std::vector<ImageId> ids = Ids(images);
+      if (RetrievesOnce(options.strategy)) {
+        RetrievalOptions retrieval = MakeRetrievalOptions(options);
+        retrieval.restrictions = restrictions;
+        return RunRetrieval(retrieval, ranking, ids, verifier, threads, on_progress);
+      }
+      GraphMatchOptions graph = MakeGraphOptions(options);
+      graph.restrictions = restrictions;
       const std::string key = LoopKey(options, graph);
       const std::vector<ImagePair> seeds =
           ChooseSeeds(graph, ranking, ids, verifier, threads, state.ReadSeeds(key));

@@ -7,6 +7,7 @@
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/options.h"
+#include "colmap_graphmatch/graph/retrieval.h"
 #include "colmap_graphmatch/pipeline/image_vectors.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
@@ -16,8 +17,11 @@ namespace colmap_graphmatch {
 struct PipelineOptions {
   std::filesystem::path database_path;
 
-  // Which pairs are tested: those that GraphMatch's loop finds, or all.
-  enum class Strategy { kGraphMatch, kExhaustive };
+  // Which pairs are tested. kGraphMatch: those that the loop finds. kSampling: the loop without
+  // propagation. kPropagation: the loop with its first sampling alone. kRetrieval: the nearest
+  // images of each. kBriad: the same and then num_expansions rounds of query expansion
+  // (graph/retrieval.h). kExhaustive: all.
+  enum class Strategy { kGraphMatch, kSampling, kPropagation, kRetrieval, kBriad, kExhaustive };
   Strategy strategy = Strategy::kGraphMatch;
 
   // Tests the pairs of this list (see pair_list.h) instead, unless it is empty.
@@ -46,6 +50,10 @@ struct PipelineOptions {
   ImageVectorOptions vectors;
   RankingOptions ranking;
   GraphMatchOptions graph;
+
+  // Images that kRetrieval and kBriad retrieve for each; 0: 120, for kBriad 40, as in the paper.
+  int num_retrieved_images = 0;
+  int num_expansions = 4;
   ColmapVerifierOptions verification;
 
   // Throws OptionsError.

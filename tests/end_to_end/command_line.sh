@@ -137,6 +137,20 @@ wait "$pid" || { cat "$work/two.txt"; fail "the first of two runs"; }
 tested_pairs "$work/two.db" | cmp - "$work/undisturbed.txt"
 check_integrity "$work/two.db"
 
+echo "== The paper's other systems"
+for strategy in sampling propagation retrieval briad; do
+  cp "$work/untouched.db" "$work/$strategy.db"
+  rm -f "$work/$strategy.db.graphmatch"
+  expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/$strategy.db" --colmap_path "$fake" \
+    --GraphMatching.strategy "$strategy" --GraphMatching.num_retrieved_images 3
+  echo "$strategy: $(grep -E 'sampling|propagation|retrieval|expansion|  all' "$work/output.txt" | tr -s ' \n' ' ')"
+  check_integrity "$work/$strategy.db"
+  expect_exit 0 'Nothing is left to test' "$matcher" --database_path "$work/$strategy.db" --colmap_path "$fake" \
+    --GraphMatching.strategy "$strategy" --GraphMatching.num_retrieved_images 3
+done
+(($(count_tested "$work/briad.db") > $(count_tested "$work/retrieval.db"))) || fail "no query expansion"
+(($(count_tested "$work/propagation.db") < $(count_tested "$database"))) || fail "more than one sampling"
+
 echo "== Only the images of a list look for partners"
 cp "$work/untouched.db" "$work/some.db"
 printf 'place0/photo 3.jpg\n# a comment\n\n place2/photo 5.jpg\nno/photo.jpg\n' >"$work/images.txt"

@@ -1,0 +1,89 @@
+#include "colmap_graphmatch/graph/retrieval.h"
+
+#include <algorithm>
+#include <string>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/graph/graph_builder.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// Calls propose(vertex, &partners) for every vertex that seeks, in parallel, and unites what it
+// proposes: ascending, each pair once, without pairs of one frame.
+template <typename Propose>
+std::vector<VertexPair> Unite(std::size_t num_vertices, const PairRestrictions& restrictions,
+                              ThreadPool& threads, const Propose& propose) {
+  std::vector<std::vector<VertexPair>> proposals(num_vertices);
+  threads.ParallelFor(num_vertices, [&](std::size_t i) {
+    const auto vertex = static_cast<Vertex>(i);
+    if (!restrictions.Seeks(vertex)) return;
+    std::vector<Vertex> partners;
+    propose(vertex, &partners);
+    std::sort(partners.begin(), partners.end());
+    partners.erase(std::unique(partners.begin(), partners.end()), partners.end());
+    for (const Vertex partner : partners) {
+      if (partner == vertex || restrictions.SameFrame(vertex, partner)) continue;
+      proposals[i].push_back(MakeVertexPair(vertex, partner));
+    }
+  });
+  std::vector<VertexPair> pairs;
+  for (const std::vector<VertexPair>& proposal : proposals) {
+    pairs.insert(pairs.end(), proposal.begin(), proposal.end());
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+}  // namespace
+
+void RetrievalOptions::Check() const {
+  if (num_images < 1) {
+    throw OptionsError("num_images is " + std::to_string(num_images) +
+                       "; at least 1 image has to be retrieved.");
+  }
+  if (num_expansions < 0) {
+    throw OptionsError("num_expansions is " + std::to_string(num_expansions) +
+                       "; it must be at least 0.");
+  }
+}
+
+GraphMatchResult RunRetrieval(const RetrievalOptions& options, const Ranking& ranking,
+                              const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                              ThreadPool& threads,
+                              const std::function<void(const LoopProgress&)>& on_progress) {
+  options.Check();
+  const std::size_t num_vertices = ranking.NumVertices();
+  if (image_ids.size() != num_vertices) throw OptionsError("Every ranked image needs its id.");
+  GraphBuilder builder(image_ids, verifier, on_progress);
+  const std::vector<VertexPair> retrieved =
+      Unite(num_vertices, options.restrictions, threads,
+            [&](Vertex vertex, std::vector<Vertex>* partners) {
+              const auto num = static_cast<std::size_t>(options.num_images);
+              *partners = ranking.NearestOf(vertex);
+              if (partners->size() < std::min(num, num_vertices - 1)) {
+                *partners = ranking.AllOf(vertex);
+              }
+              partners->resize(std::min(num, partners->size()));
+            });
+  builder.Verify(LoopStage::kRetrieval, 0, retrieved, 0);
+  for (int round = 0; round < options.num_expansions && builder.Continues(); ++round) {
+    const MatchingGraph& graph = builder.Graph();
+    const std::vector<VertexPair> expanded =
+        Unite(num_vertices, options.restrictions, threads,
+              [&](Vertex vertex, std::vector<Vertex>* partners) {
+                for (const Vertex neighbor : graph.Neighbors(vertex)) {
+                  for (const Vertex other : graph.Neighbors(neighbor)) {
+                    if (!graph.IsTested(vertex, other)) partners->push_back(other);
+                  }
+                }
+              });
+    if (expanded.empty()) break;
+    builder.Verify(LoopStage::kExpansion, round, expanded, 0);
+  }
+  builder.AddKnown();
+  return builder.Finish();
+}
+
+}  // namespace colmap_graphmatch

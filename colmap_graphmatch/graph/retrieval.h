@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/pair_restrictions.h"
+#include "colmap_graphmatch/ranking/ranking.h"
+
+namespace colmap_graphmatch {
+
+struct RetrievalOptions {
+  // Images of nearest vectors that every image is tested with, its rank being as good as the
+  // other's. At least 1. The paper retrieves 120 from a vocabulary tree, and 40 for BRIAD.
+  int num_images = 120;
+
+  // Rounds of query expansion after that. At least 0. BRIAD runs 4.
+  int num_expansions = 0;
+
+  // Images that do not seek retrieve nothing and are not expanded.
+  PairRestrictions restrictions;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+// The rivals of the paper (GraphMatch, section 4): every image is tested with its nearest ones, all
+// in one batch; then, in each round of query expansion, with the neighbours of its neighbours in the
+// graph that was found before (Agarwal et al., Building Rome in a Day, ICCV 2009, section 3.3: if i
+// and k match j, i and k are tested). image_ids gives the image of every vertex, ascending. Known
+// pairs are asked for like all others, in the same batches, so that an interrupted run ends like one
+// that was not; those not asked for join the graph in the end. Exceptions of the verifier pass
+// through.
+GraphMatchResult RunRetrieval(const RetrievalOptions& options, const Ranking& ranking,
+                              const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                              ThreadPool& threads,
+                              const std::function<void(const LoopProgress&)>& on_progress);
+
+}  // namespace colmap_graphmatch
