@@ -18,6 +18,7 @@
 
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/retrieval.h"
 #include "colmap_graphmatch/pipeline/image_vectors.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
@@ -47,18 +48,23 @@ std::unordered_map<ImagePair, std::uint32_t> ReadEdges(const std::string& path,
   return edges;
 }
 
+// The first stage is sampling or retrieval, the second propagation or expansion.
+void Print(const std::string& name, const GraphMatchResult& result, std::size_t num_edges) {
+  const StageStatistics all = result.All();
+  const StageStatistics first = result.sampling + result.retrieval;
+  const StageStatistics second = result.propagation + result.expansion;
+  fmt::print("{:<42} {:>6} {:>7.4f} {:>7.3f} | {:>6} {:>6.3f} | {:>6} {:>6.3f} | {:>3} {:>4}\n",
+             name, all.num_tested,
+             static_cast<double>(all.num_edges) / static_cast<double>(num_edges), all.Efficiency(),
+             first.num_tested, first.Efficiency(), second.num_tested, second.Efficiency(),
+             result.num_components, result.iterations.size());
+}
+
 void Run(const std::string& name, const GraphMatchOptions& options, const Ranking& ranking,
          const std::vector<ImageId>& ids, const std::unordered_map<ImagePair, std::uint32_t>& edges,
          ThreadPool& threads) {
   ReplayVerifier verifier(edges);
-  const GraphMatchResult result = RunGraphMatch(options, ranking, ids, verifier, threads, nullptr);
-  const StageStatistics all = result.sampling + result.propagation;
-  fmt::print("{:<42} {:>6} {:>7.4f} {:>7.3f} | {:>6} {:>6.3f} | {:>6} {:>6.3f} | {:>3} {:>4}\n",
-             name, all.num_tested,
-             static_cast<double>(all.num_edges) / static_cast<double>(edges.size()),
-             all.Efficiency(), result.sampling.num_tested, result.sampling.Efficiency(),
-             result.propagation.num_tested, result.propagation.Efficiency(), result.num_components,
-             result.iterations.size());
+  Print(name, RunGraphMatch(options, ranking, ids, verifier, threads, nullptr), edges.size());
 }
 
 void Main(const std::string& database_path, const std::string& edges_path) {
@@ -104,6 +110,28 @@ void Main(const std::string& database_path, const std::string& edges_path) {
   with("num_to_propagate 0 (sampling alone)", [](G* g) { g->num_to_propagate = 0; });
   with("num_to_propagate 2", [](G* g) { g->num_to_propagate = 2; });
   with("num_to_propagate 8", [](G* g) { g->num_to_propagate = 8; });
+
+  const auto retrieve = [&](const std::string& name, int num_images, int num_expansions) {
+    RetrievalOptions options;
+    options.num_images = num_images;
+    options.num_expansions = num_expansions;
+    ReplayVerifier verifier(edges);
+    Print(fmt::format("{}, {} images", name, num_images),
+          RunRetrieval(options, ranking, ids, verifier, threads, nullptr), edges.size());
+  };
+  with("number_sample_iterations 1 (propagation)", [](G* g) { g->number_sample_iterations = 1; });
+  for (const int num_images : {5, 10, 14, 20, 28, 40, 80, 120}) {
+    retrieve("strategy retrieval", num_images, 0);
+  }
+  for (const int num_images : {5, 10, 20, 40}) retrieve("strategy briad", num_images, 4);
+  for (const int budget : {10, 20, 30, 60, 120}) {
+    with(fmt::format("strategy graphmatch, budget {}", budget),
+         [budget](G* g) { g->max_tests_for_sampling = budget; });
+    with(fmt::format("strategy sampling, budget {}", budget), [budget](G* g) {
+      g->max_tests_for_sampling = budget;
+      g->num_to_propagate = 0;
+    });
+  }
 
   vector_options.feature_selection = ImageVectorOptions::FeatureSelection::kRandom;
   Run("feature_selection random", G(), rank(vector_options), ids, edges, threads);
