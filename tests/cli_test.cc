@@ -18,6 +18,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::Pair;
 
 CommandLine Parse(std::vector<std::string> arguments) {
@@ -138,6 +139,10 @@ TEST(Options, TakeTheValuesThatColmapTakes) {
   EXPECT_THAT(ErrorOf({"--SiftMatching.confidence", "1.5"}), HasSubstr("from 0 to 1"));
 }
 
+TEST(Options, AnEmptyListOfImagesIsNone) {
+  EXPECT_TRUE(Parse({"--VocabTreeMatching.match_list_path", ""}).pipeline.image_list_path.empty());
+}
+
 TEST(Options, WithoutMeaningAreSaidOnce) {
   const CommandLine line =
       Parse({"--VocabTreeMatching.vocab_tree_path", "tree.bin", "--VocabTreeMatching.num_checks",
@@ -182,6 +187,9 @@ TEST(Options, TheNearestNameIsSuggested) {
               HasSubstr("Did you mean --VocabTreeMatching.num_images?"));
   EXPECT_THAT(ErrorOf({"--VocabTreeMatching.vocab_tree_paht", "x"}),
               HasSubstr("Did you mean --VocabTreeMatching.vocab_tree_path?"));
+  EXPECT_THAT(ErrorOf({"--sIFTmATCHING.MAX_RATIO", "1"}),
+              HasSubstr("Did you mean --SiftMatching.max_ratio?"));
+  EXPECT_THAT(ErrorOf({"--ExhaustiveMatching.block_size", "50"}), Not(HasSubstr("Did you mean")));
   EXPECT_THAT(ErrorOf({"--GraphMatching.max_neighbors", "8"}),
               HasSubstr("Did you mean --GraphMatching.max_num_neighbors?"));
 }
@@ -189,8 +197,8 @@ TEST(Options, TheNearestNameIsSuggested) {
 TEST(Options, ErrorsNameTheOptionAsItWasGiven) {
   EXPECT_EQ(ErrorOf({"--FeatureMatching.max_ratio", "zero"}),
             "--FeatureMatching.max_ratio is \"zero\"; it must be a number greater than 0.");
-  EXPECT_EQ(ErrorOf({"--GraphMatching.strategy", "x"}),
-            "--GraphMatching.strategy is \"x\"; it must be one of exhaustive, graphmatch.");
+  EXPECT_EQ(ErrorOf({"--GraphMatching.matcher", "x"}),
+            "--GraphMatching.matcher is \"x\"; it must be one of auto, colmap, exact.");
   EXPECT_THAT(ErrorOf({"--GraphMatching.strategy"}), HasSubstr("GraphMatching.strategy"));
   EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("\"stray\" on the command line belongs to no option"));
 }
@@ -239,7 +247,7 @@ TEST_F(ProjectTest, DefaultsWithoutMeaningAreNotMentioned) {
 
 TEST_F(ProjectTest, UnknownNamesInGroupsOfMatchingAreMentioned) {
   const std::string text = "[SiftMatching]\nmax_ratioo=0.5\n[Mapper]\nno_such_option=1\n";
-  EXPECT_THAT(Parse(Project(text)).unused_options,
+  EXPECT_THAT(Parse(Project(text)).warnings,
               ElementsAre(HasSubstr("unknown option SiftMatching.max_ratioo. Did you mean "
                                     "--SiftMatching.max_ratio?")));
 }

@@ -719,14 +719,17 @@ std::vector<std::string> Statements() {
         table + "'");
   }
   for (const char* definition :
-       {"TABLE frame_data(data_id, frame_id, sensor_type AS (length(hex(zeroblob(490000000))) * "
-        "0))",
-        "TABLE frame_data(data_id INTEGER, frame_id INTEGER)",
-        "TABLE frame_data(data_id, frame_id, sensor_type)",
-        "TABLE frame_data(data_id INTEGER PRIMARY KEY, frame_id, sensor_type) WITHOUT ROWID"}) {
-    list.push_back("DROP TABLE IF EXISTS frame_data; CREATE " + std::string(definition) +
+       {"data_id INTEGER, frame_id INTEGER)", "data_id, frame_id, sensor_type)",
+        "data_id INTEGER PRIMARY KEY, frame_id, sensor_type) WITHOUT ROWID"}) {
+    list.push_back("DROP TABLE IF EXISTS frame_data; CREATE TABLE frame_data(" +
+                   std::string(definition) +
                    "; INSERT INTO frame_data(data_id, frame_id) VALUES(1, 'x'), (2, -1)");
   }
+  // Computed when it is read: the rows come first, since that would compute it here.
+  list.push_back(
+      "DROP TABLE IF EXISTS frame_data; CREATE TABLE frame_data(data_id, frame_id); INSERT INTO "
+      "frame_data VALUES(1, 1), (2, 1); ALTER TABLE frame_data ADD COLUMN sensor_type AS "
+      "(length(hex(zeroblob(490000000))) * 0)");
   list.push_back(std::string("DROP TABLE IF EXISTS frame_data; CREATE VIEW frame_data") +
                  kEndlessView);
   // Rows without keys, whose joins would have 10^9 rows and more.

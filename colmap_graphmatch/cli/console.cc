@@ -56,8 +56,7 @@ std::string FormatVerification(const VerifierStatistics& statistics) {
     text += fmt::format(
         "COLMAP             {} pairs in {}, summed over its processes: {:.0f} % of {}\n",
         statistics.num_verified, FormatDuration(statistics.colmap_seconds),
-        100 * statistics.colmap_seconds / both,
-        statistics.num_matched > 0 ? "both" : "matching and verification");
+        100 * statistics.colmap_seconds / both, "matching and verification");
   }
   return text;
 }
@@ -177,7 +176,11 @@ std::string FormatSummary(const PipelineResult& result) {
   }
   text += FormatStage("all", all);
   if (all.num_tested + all.num_failed == 0 && matching.finished) {
-    text += "  Nothing is left to test with these options.\n";
+    text +=
+        "  Nothing is left to test: all pairs that these options ask for were tested before, "
+        "perhaps "
+        "with other\n  options of matching. To match anew: colmap database_cleaner --type matches "
+        "--database_path DATABASE\n";
   }
   text +=
       fmt::format("Matching graph     {} edges, {} components, the largest of {} images\n",

@@ -26,7 +26,7 @@ void HandleSignal(int /*signal*/) {
   stop_request.Raise();
   if (!first) return;
   static constexpr char kMessage[] =
-      "\nStopping after the shards under way; once more gives them up.\n";
+      "\nStopping after the pairs that COLMAP is working on; once more gives them up.\n";
   const auto ignored = ::write(STDERR_FILENO, kMessage, sizeof(kMessage) - 1);
   static_cast<void>(ignored);
 }
@@ -57,6 +57,7 @@ int Run(const CommandLine& line) {
   InstallSignalHandlers();
   Console console(stderr);
   for (const std::string& message : line.unused_options) console.OnInfo(message);
+  for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
     console.ClearProgress();

@@ -313,7 +313,12 @@ void Table::AddGraph() {
   Add("GraphMatching.match_list_path", TextOf(&p.match_list_path, "the path of a list of pairs"),
       "a file of image pairs to be tested instead, two names a line");
   AddColmap(Use::kHere, {{{3, 8}, "VocabTreeMatching.match_list_path", ""}},
-            TextOf(&p.image_list_path, "the path of a list of images"),
+            // COLMAP's default is an empty one.
+            {"the path of a list of images, or nothing", "",
+             [list = &p.image_list_path](const std::string& text) {
+               *list = text;
+               return true;
+             }},
             "a file of image names, one a line: only these look for partners, among all images");
   Add("GraphMatching.number_sample_iterations", IntOf(&p.graph.number_sample_iterations, 0),
       "iterations (>= 0) that sample before propagating; later ones only propagate");
@@ -324,7 +329,8 @@ void Table::AddGraph() {
   OptionRow& neighbors =
       Add("GraphMatching.max_num_neighbors", IntOf(&p.graph.max_num_neighbors, 1),
           "neighbours (>= 1) after which an image looks for no more itself. Fewer thins dense "
-          "scenes. VocabTreeMatching.num_images is another name for it");
+          "scenes. VocabTreeMatching.num_images is another name for it, which to COLMAP means the "
+          "images that are tested with each (100)");
   neighbors.use = Use::kHere;
   neighbors.colmap = {{{3, 8}, "VocabTreeMatching.num_images", "100"}};
   AddName("VocabTreeMatching.num_images", &neighbors);
@@ -374,7 +380,7 @@ void Table::AddMatching() {
       "often");
   Add("GraphMatching.preemptive_num_features", IntOf(&exact.preemptive_num_features, 0),
       "features (>= 1) of the largest scales that are matched first, to give up pairs with few "
-      "matches early; 0: match all at once");
+      "matches early, which loses edges; 0: match all at once");
   Add("GraphMatching.preemptive_min_matches", IntOf(&exact.preemptive_min_matches, 1),
       "matches (>= 1) of those that a pair needs, or else it counts as tested, without an edge");
 }
@@ -497,7 +503,7 @@ void Table::AddUnusedOptions() {
   AddUnused({{{3, 13}, "FeatureMatching.rig_verification", "0"}},
             "verify rigs afterwards with `colmap geometric_verifier`");
 
-  const char* log = "of COLMAP's log";
+  const char* log = "COLMAP's log is not kept";
   AddUnused({{{3, 8}, "log_to_stderr", "0"}, {{3, 9}, "log_to_stderr", "1"}, {{4, 0}, "", ""}},
             log);
   AddUnused({{{3, 8}, "log_level", "2"}, {{3, 9}, "log_level", "0"}}, log);

@@ -4,7 +4,9 @@
 #include <boost/lexical_cast.hpp>
 #include <boost/program_options.hpp>
 #include <cctype>
+#include <cerrno>
 #include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -26,6 +28,12 @@ namespace po = boost::program_options;
 constexpr char kSeeHelp[] = "`graphmatch_matcher -h` lists the options.";
 
 std::string WithoutGroup(const std::string& name) { return name.substr(name.find('.') + 1); }
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
 
 std::size_t EditDistance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -159,8 +167,10 @@ class Parser {
   void ReadProject() {
     const std::string path = line_->project_path.string();
     std::ifstream file(path);
+    const int reason = errno;
     if (!file || std::filesystem::is_directory(path)) {
-      throw OptionsError("Cannot read the project file " + path + " (--project_path).");
+      throw OptionsError("Cannot read the project file " + path +
+                         " (--project_path): " + std::strerror(file ? EISDIR : reason) + ".");
     }
     po::parsed_options parsed(&accepted_);
     try {
@@ -180,7 +190,7 @@ class Parser {
         // It may be one of a newer COLMAP.
         static const std::set<std::string> kMatchingGroups = {
             "SiftMatching", "TwoViewGeometry", "FeatureMatching", "VocabTreeMatching"};
-        if (kMatchingGroups.count(group) > 0) line_->unused_options.push_back(problem);
+        if (kMatchingGroups.count(group) > 0) line_->warnings.push_back(problem);
         continue;
       }
       const std::string value = option.value.empty() ? "" : option.value.front();
@@ -227,18 +237,20 @@ class Parser {
   // options moved between groups.
   std::string Suggest(const std::string& unknown) const {
     const std::string given =
-        unknown.substr(std::min(unknown.find_first_not_of('-'), unknown.size()));
+        Lower(unknown.substr(std::min(unknown.find_first_not_of('-'), unknown.size())));
     std::tuple<std::size_t, bool, std::size_t> least(std::numeric_limits<std::size_t>::max(), true,
                                                      0);
     std::string nearest;
     for (const auto& [name, row] : by_name_) {
       const std::tuple<std::size_t, bool, std::size_t> distance(
-          EditDistance(WithoutGroup(given), WithoutGroup(name)), name != row->name,
-          EditDistance(given, name));
+          EditDistance(WithoutGroup(given), WithoutGroup(Lower(name))), name != row->name,
+          EditDistance(given, Lower(name)));
       if (distance >= least) continue;
       least = distance;
       nearest = name;
     }
+    // Most of it has to be right.
+    if (std::get<0>(least) * 2 > WithoutGroup(given).size()) return kSeeHelp;
     return "Did you mean --" + nearest + "? " + kSeeHelp;
   }
 

@@ -19,6 +19,7 @@ struct CommandLine {
   // What is to be said about options of vocab_tree_matcher that were given and have no meaning
   // here, an entry each.
   std::vector<std::string> unused_options;
+  std::vector<std::string> warnings;
 };
 
 // Throws OptionsError.

@@ -132,7 +132,7 @@ Connection::Connection(const std::filesystem::path& path, Access access,
 void Connection::Execute(const std::string& sql) {
   *progress_calls_left_ = progress_calls_to_run_;
   if (sqlite3_exec(db_.get(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
-    Throw("run \"" + sql.substr(0, 60) + "\"");
+    Throw("write");
   }
 }
 
@@ -207,7 +207,7 @@ Statement::Statement(Connection& connection, const std::string& sql)
   *connection.progress_calls_left_ = kProgressCallsToPrepare;
   sqlite3_stmt* statement = nullptr;
   if (sqlite3_prepare_v2(connection.db_.get(), sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
-    connection.Throw("prepare \"" + sql.substr(0, 60) + "\"");
+    connection.Throw("read the tables");
   }
   statement_.reset(statement);
 }

@@ -29,6 +29,10 @@ std::int64_t ReadNumber(sqlite::Connection& connection, const std::string& sql) 
   return select.Step() ? select.Int(0) : 0;
 }
 
+void SetVersion(sqlite::Connection& connection) {
+  connection.Execute("PRAGMA user_version = " + std::to_string(kFormatVersion));
+}
+
 void CreateTables(sqlite::Connection& connection) {
   connection.Execute(
       "CREATE TABLE mixture(key TEXT NOT NULL, checksum INTEGER NOT NULL, "
@@ -39,7 +43,7 @@ void CreateTables(sqlite::Connection& connection) {
   connection.Execute("CREATE TABLE run(key TEXT NOT NULL, checksum INTEGER NOT NULL)");
   connection.Execute("CREATE TABLE seeds(pair_id INTEGER PRIMARY KEY NOT NULL)");
   connection.Execute("PRAGMA application_id = " + std::to_string(kApplicationId));
-  connection.Execute("PRAGMA user_version = " + std::to_string(kFormatVersion));
+  SetVersion(connection);
 }
 
 // For a file that SQLite cannot read any more. No connection to it may be open in this process:
@@ -80,6 +84,8 @@ Content LockAndExamine(sqlite::Connection& connection) {
   sqlite::Transaction transaction(connection, sqlite::Transaction::Kind::kExclusive);
   const Content content = Examine(connection);
   if (content == Content::kEmpty) CreateTables(connection);
+  // A write that changes nothing: with it goes the journal that a killed run has left.
+  if (content == Content::kIntact) SetVersion(connection);
   transaction.Commit();
   return content;
 }
@@ -174,6 +180,19 @@ void StateFile::DropVectorsExcept(const std::vector<ImageFingerprint>& images) {
   sqlite::Statement drop(connection_, "DELETE FROM vectors WHERE image_id = ?1");
   for (const std::int64_t id : others) drop.Bind(1, id).Run();
   transaction.Commit();
+}
+
+std::vector<ImageId> StateFile::FindChanged(const std::vector<ImageFingerprint>& images) {
+  sqlite::Statement select(connection_,
+                           "SELECT 1 FROM vectors WHERE image_id = ?1 AND features <> ?2");
+  std::vector<ImageId> changed;
+  for (const ImageFingerprint& image : images) {
+    if (select.Bind(1, std::int64_t{image.id}).Bind(2, image.features).Step()) {
+      changed.push_back(image.id);
+    }
+    select.Reset();
+  }
+  return changed;
 }
 
 std::size_t StateFile::CountVectors(const std::vector<ImageFingerprint>& images) {

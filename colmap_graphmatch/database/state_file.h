@@ -43,6 +43,9 @@ class StateFile {
   // Drops the vectors of images that are not among these, which ascend.
   void DropVectorsExcept(const std::vector<ImageFingerprint>& images);
 
+  // The images that have a vector which was stored for other features.
+  std::vector<ImageId> FindChanged(const std::vector<ImageFingerprint>& images);
+
   // How many of the images have a vector that was stored for the same features.
   std::size_t CountVectors(const std::vector<ImageFingerprint>& images);
   // Fills the rows (dim floats each) of `vectors` of those images; true for each of them.

@@ -28,12 +28,12 @@ struct RetrievalOptions {
 };
 
 // The rivals of the paper (GraphMatch, section 4): every image is tested with its nearest ones, all
-// in one batch; then, in each round of query expansion, with the neighbours of its neighbours in the
-// graph that was found before (Agarwal et al., Building Rome in a Day, ICCV 2009, section 3.3: if i
-// and k match j, i and k are tested). image_ids gives the image of every vertex, ascending. Known
-// pairs are asked for like all others, in the same batches, so that an interrupted run ends like one
-// that was not; those not asked for join the graph in the end. Exceptions of the verifier pass
-// through.
+// in one batch; then, in each round of query expansion, with the neighbours of its neighbours in
+// the graph that was found before (Agarwal et al., Building Rome in a Day, ICCV 2009, section 3.3:
+// if i and k match j, i and k are tested). image_ids gives the image of every vertex, ascending.
+// Known pairs are asked for like all others, in the same batches, so that an interrupted run ends
+// like one that was not; those not asked for join the graph in the end. Exceptions of the verifier
+// pass through.
 GraphMatchResult RunRetrieval(const RetrievalOptions& options, const Ranking& ranking,
                               const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                               ThreadPool& threads,

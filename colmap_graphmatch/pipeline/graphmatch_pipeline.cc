@@ -108,14 +108,41 @@ std::vector<float> FindVectors(const ImageVectorOptions& options, const Gaussian
   return vectors;
 }
 
+// Their pairs were tested with features that are gone; COLMAP itself keeps such pairs without a
+// word.
+void WarnOfChangedFeatures(const std::vector<ImageId>& changed,
+                           const std::vector<ImageRecord>& images,
+                           const std::vector<VerifiedPair>& known, const std::string& database_path,
+                           PipelineObserver& observer) {
+  const auto has_changed = [&](ImageId image) {
+    return std::binary_search(changed.begin(), changed.end(), image);
+  };
+  std::size_t num_pairs = 0;
+  for (const VerifiedPair& pair : known) {
+    num_pairs += has_changed(pair.pair.id1) || has_changed(pair.pair.id2) ? 1 : 0;
+  }
+  if (num_pairs == 0) return;
+  const auto first = std::find_if(images.begin(), images.end(),
+                                  [&](const ImageRecord& image) { return has_changed(image.id); });
+  observer.OnWarning("Images have other features than in the last run (" +
+                     std::to_string(changed.size()) + ", the first is \"" + first->name +
+                     "\"), and " + std::to_string(num_pairs) +
+                     " pairs of theirs still have the matches of the old features. To match all "
+                     "anew: colmap database_cleaner --type matches --database_path " +
+                     database_path);
+}
+
 // From the features to ranked lists: mixture, Fisher vectors, distances.
 Ranking RankImages(const PipelineOptions& options, Database& database,
-                   const std::vector<ImageRecord>& images, RunState& state, ThreadPool& threads,
-                   const StopRequest& stop, PipelineObserver& observer, PipelineResult* result) {
+                   const std::vector<ImageRecord>& images, const std::vector<VerifiedPair>& known,
+                   RunState& state, ThreadPool& threads, const StopRequest& stop,
+                   PipelineObserver& observer, PipelineResult* result) {
   ImageVectorOptions vector_options = options.vectors;
   vector_options.seed = options.seed;
   vector_options.gmm.seed = options.seed;
   state.Select(vector_options, database.ReadFingerprints(images));
+  WarnOfChangedFeatures(state.FindChanged(), images, known, options.database_path.string(),
+                        observer);
   const GaussianMixture mixture = Timed(&result->mixture_seconds, [&] {
     return FindMixture(options, vector_options, database, images, state, threads, stop, observer);
   });
@@ -207,7 +234,7 @@ std::vector<ImagePair> ReadListedPairs(const std::filesystem::path& path,
                                        const std::vector<ImageRecord>& images,
                                        PipelineObserver& observer) {
   PairList list = ReadPairList(path, images);
-  WarnOfSkippedLines(list, path, "two images", observer);
+  WarnOfSkippedLines(list, path, "two different images", observer);
   return std::move(list.pairs);
 }
 
@@ -292,8 +319,8 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
       return VerifyAllPairs(Ids(images), verifier, on_progress, restrictions);
     });
   } else {
-    const Ranking ranking =
-        RankImages(options, database, images, state, threads, stop, observer, &result);
+    const Ranking ranking = RankImages(options, database, images, verifier.KnownPairs(), state,
+                                       threads, stop, observer, &result);
     const std::vector<ImageId> ids = Ids(images);
     result.matching = Timed(&result.matching_seconds, [&] {
       if (RetrievesOnce(options.strategy)) {

@@ -92,7 +92,11 @@ RunState::RunState(const std::filesystem::path& database_path, double lock_timeo
         file_ = std::make_unique<StateFile>(path, std::clamp(left, 0.0, told ? kSecondsATry : 0.0));
       } catch (const DatabaseLockedError&) {
         if (left <= 0) throw;
-        if (!told) info("Another graphmatch_matcher works on this database; waiting for it.");
+        if (!told) {
+          info("Another graphmatch_matcher works on this database; waiting for it, up to " +
+               std::to_string(static_cast<long>(lock_timeout_seconds)) +
+               " s (--GraphMatching.lock_timeout).");
+        }
       }
     }
     usable_ = true;
@@ -133,6 +137,12 @@ void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFinger
                  std::to_string(options.max_num_features) + ", selection " +
                  std::to_string(static_cast<int>(options.feature_selection)) + ", seed " +
                  std::to_string(options.seed) + " " + std::to_string(gmm.seed);
+}
+
+std::vector<ImageId> RunState::FindChanged() {
+  std::vector<ImageId> changed;
+  Try([&] { changed = file_->FindChanged(images_); });
+  return changed;
 }
 
 std::optional<GaussianMixture> RunState::ReadMixture() {

@@ -30,6 +30,9 @@ class RunState {
   // Chooses what is kept: vectors of these images under these options.
   void Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images);
 
+  // The selected images whose features are not those of the last run.
+  std::vector<ImageId> FindChanged();
+
   // The mixture of an earlier run, if at least half of the images have a vector under it. With more
   // new images than that it is worth learning another one.
   std::optional<GaussianMixture> ReadMixture();

@@ -107,6 +107,9 @@ cp "$database.graphmatch" "$work/kept.db.graphmatch"
 sqlite3 "$work/kept.db" "UPDATE descriptors SET data = (SELECT data FROM descriptors WHERE image_id = 8)
   WHERE image_id = 7"
 expect_exit 0 'those of 39 images are from the last run' "$matcher" --database_path "$work/kept.db" --colmap_path "$fake"
+# Its pairs are not what they were: COLMAP keeps such pairs, and so does this, but not without a word.
+grep -q 'other features than in the last run (1, the first is "place0/photo 6.jpg")' "$work/output.txt" ||
+  fail "no warning that features have changed"
 expect_exit 0 'Learnt a mixture' "$matcher" --database_path "$work/kept.db" --colmap_path "$fake" --random_seed 5
 # Deleted or damaged, it costs nothing but time.
 # shellcheck disable=SC2016
