@@ -14,6 +14,16 @@ void MergeAppended(std::size_t old_size, std::vector<Vertex>* list) {
 
 }  // namespace
 
+std::vector<VertexPair> UniteProposals(const std::vector<std::vector<VertexPair>>& proposals) {
+  std::vector<VertexPair> pairs;
+  for (const std::vector<VertexPair>& proposal : proposals) {
+    pairs.insert(pairs.end(), proposal.begin(), proposal.end());
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
 MatchingGraph::MatchingGraph(std::size_t num_vertices)
     : neighbors_(num_vertices), tested_(num_vertices) {}
 

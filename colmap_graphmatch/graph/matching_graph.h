@@ -16,6 +16,9 @@ inline VertexPair MakeVertexPair(Vertex a, Vertex b) {
   return a < b ? VertexPair(a, b) : VertexPair(b, a);
 }
 
+// What several tasks propose, as one list: ascending, each pair once.
+std::vector<VertexPair> UniteProposals(const std::vector<std::vector<VertexPair>>& proposals);
+
 struct TestedVertexPair {
   VertexPair pair;
   bool is_edge = false;

@@ -50,13 +50,7 @@ std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Rankin
       PropagateAlong(b, a, options, ranking, graph, &proposals[task]);
     }
   });
-  std::vector<VertexPair> pairs;
-  for (const std::vector<VertexPair>& proposal : proposals) {
-    pairs.insert(pairs.end(), proposal.begin(), proposal.end());
-  }
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  return pairs;
+  return UniteProposals(proposals);
 }
 
 }  // namespace colmap_graphmatch

@@ -27,13 +27,7 @@ std::vector<VertexPair> Unite(std::size_t num_vertices, const PairRestrictions& 
       proposals[i].push_back(MakeVertexPair(vertex, partner));
     }
   });
-  std::vector<VertexPair> pairs;
-  for (const std::vector<VertexPair>& proposal : proposals) {
-    pairs.insert(pairs.end(), proposal.begin(), proposal.end());
-  }
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  return pairs;
+  return UniteProposals(proposals);
 }
 
 }  // namespace

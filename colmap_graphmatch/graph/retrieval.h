@@ -13,8 +13,8 @@
 namespace colmap_graphmatch {
 
 struct RetrievalOptions {
-  // Images of nearest vectors that every image is tested with, its rank being as good as the
-  // other's. At least 1. The paper retrieves 120 from a vocabulary tree, and 40 for BRIAD.
+  // The nearest images that every image is tested with; a pair is tested if either retrieves the
+  // other. At least 1. The paper retrieves 120 from a vocabulary tree, and 40 for BRIAD.
   int num_images = 120;
 
   // Rounds of query expansion after that. At least 0. BRIAD runs 4.

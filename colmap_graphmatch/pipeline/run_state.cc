@@ -177,7 +177,8 @@ void RunState::KeepVectors(const std::vector<std::size_t>& which, std::size_t di
   images.reserve(which.size());
   for (const std::size_t i : which) images.push_back(images_[i]);
   Try([&] {
-    file_->DropVectorsExcept(images_);
+    if (!dropped_others_) file_->DropVectorsExcept(images_);
+    dropped_others_ = true;
     file_->WriteVectors(images, dim, vectors);
   });
 }

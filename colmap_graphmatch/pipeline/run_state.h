@@ -59,6 +59,7 @@ class RunState {
   std::string vectors_key_;
   std::string mixture_checksum_;
   std::vector<ImageFingerprint> images_;
+  bool dropped_others_ = false;  // The vectors of images that are not selected.
   std::optional<std::vector<ImagePair>> kept_seeds_;
 };
 
