@@ -70,11 +70,11 @@ Scene MakeScene(int num_places, int photos_a_place, int reach, double noise, std
   return scene;
 }
 
-Ranking MakeRanking(const Scene& scene, std::size_t list_length = 512) {
+VectorRanking MakeRanking(const Scene& scene, std::size_t list_length = 512) {
   ThreadPool threads(2);
   RankingOptions options;
   options.list_length = list_length;
-  return Ranking(options, scene.num_vertices, kDim, scene.vectors, threads);
+  return VectorRanking(options, scene.num_vertices, kDim, scene.vectors, threads);
 }
 
 // Not 0, 1, 2, ...: the loop must not take vertices for ids.
@@ -202,7 +202,7 @@ Scene Fan(std::size_t num_vertices) {
 }
 
 TEST(Sampling, ProposesTheNextUntestedOfTheRankedList) {
-  const Ranking ranking = MakeRanking(Fan(5));
+  const VectorRanking ranking = MakeRanking(Fan(5));
   ThreadPool threads(1);
   GraphMatchOptions options;
   Sampler sampler(options, ranking, threads);
@@ -216,7 +216,7 @@ TEST(Sampling, ProposesTheNextUntestedOfTheRankedList) {
 }
 
 TEST(Sampling, GoesOnBeyondTheKeptList) {
-  const Ranking ranking = MakeRanking(Fan(5), 1);
+  const VectorRanking ranking = MakeRanking(Fan(5), 1);
   ThreadPool threads(1);
   Sampler sampler(GraphMatchOptions(), ranking, threads);
   MatchingGraph graph(5);
@@ -226,7 +226,7 @@ TEST(Sampling, GoesOnBeyondTheKeptList) {
 }
 
 TEST(Sampling, LeavesFullVerticesOut) {
-  const Ranking ranking = MakeRanking(Fan(4));
+  const VectorRanking ranking = MakeRanking(Fan(4));
   ThreadPool threads(1);
   GraphMatchOptions options;
   options.max_num_neighbors = 1;
@@ -238,7 +238,7 @@ TEST(Sampling, LeavesFullVerticesOut) {
 }
 
 TEST(Sampling, StopsAtTheBudget) {
-  const Ranking ranking = MakeRanking(Fan(30));
+  const VectorRanking ranking = MakeRanking(Fan(30));
   ThreadPool threads(1);
   GraphMatchOptions options;
   options.max_tests_for_sampling = 3;
@@ -252,7 +252,7 @@ TEST(Sampling, StopsAtTheBudget) {
 }
 
 TEST(Propagation, ClosesTriangles) {
-  const Ranking ranking = MakeRanking(Fan(5));
+  const VectorRanking ranking = MakeRanking(Fan(5));
   ThreadPool threads(1);
   MatchingGraph graph(5);
   graph.Add({{{0, 1}, true}, {{1, 2}, true}, {{2, 3}, false}});
@@ -263,7 +263,7 @@ TEST(Propagation, ClosesTriangles) {
 }
 
 TEST(Propagation, HandsOnTheNearestOnly) {
-  const Ranking ranking = MakeRanking(Fan(10));
+  const VectorRanking ranking = MakeRanking(Fan(10));
   ThreadPool threads(1);
   MatchingGraph graph(10);
   // 9 is a hub of 2 .. 8, and 0 knows it.
@@ -282,7 +282,7 @@ TEST(Propagation, HandsOnTheNearestOnly) {
 }
 
 TEST(Propagation, FullVerticesAreReachedFromOthersOnly) {
-  const Ranking ranking = MakeRanking(Fan(4));
+  const VectorRanking ranking = MakeRanking(Fan(4));
   ThreadPool threads(1);
   GraphMatchOptions options;
   options.max_num_neighbors = 1;
@@ -341,7 +341,7 @@ class EveryChoice : public ::testing::TestWithParam<NamedOptions> {};
 TEST_P(EveryChoice, TestsTheSamePairsAsThePseudoCode) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const Scene scene = MakeScene(6, 14, 4, 0.6, seed);
-    const Ranking ranking = MakeRanking(scene);
+    const VectorRanking ranking = MakeRanking(scene);
     RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
     const GraphMatchResult result = RunLoop(GetParam().options, ranking, &verifier);
     EXPECT_EQ(AsSets(verifier.batches), ReferenceBatches(GetParam().options, ranking, scene));
@@ -373,7 +373,7 @@ TEST_P(EveryChoice, TestsNoPairTwiceAndKeepsTheDegreeLimit) {
 
 TEST_P(EveryChoice, GivesOneResultForAnyNumberOfThreads) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 5);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
   RecordingVerifier one(edges);
   RunLoop(GetParam().options, ranking, &one, 1);
@@ -386,7 +386,7 @@ TEST_P(EveryChoice, GivesOneResultForAnyNumberOfThreads) {
 
 TEST_P(EveryChoice, GoesOnAfterAnInterruptionAsIfThereWasNone) {
   const Scene scene = MakeScene(5, 12, 4, 0.7, 8);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
   RecordingVerifier undisturbed(edges);
   const GraphMatchResult expected = RunLoop(GetParam().options, ranking, &undisturbed);
@@ -468,7 +468,7 @@ TEST(Loop, HandlesNoneOneAndTwoImages) {
 
 TEST(Loop, EdgesOfOtherMatchersSeedTheGraph) {
   const Scene scene = MakeScene(4, 12, 11, 0.4, 9);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   const std::set<ImagePair> edges = ImageEdges(scene, ids);
   RecordingVerifier verifier(edges);
@@ -490,7 +490,7 @@ TEST(Loop, EdgesOfOtherMatchersSeedTheGraph) {
 
 TEST(Loop, SeedsCountTowardsTheDegreeBeforeTheFirstSample) {
   const Scene scene = MakeScene(2, 10, 9, 0.4, 9);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   // Edges of the first image that sampling would not draw: to the images that look least like it.
   std::set<ImagePair> edges = ImageEdges(scene, ids);
@@ -519,7 +519,7 @@ TEST(Loop, SeedsCountTowardsTheDegreeBeforeTheFirstSample) {
 
 TEST(Loop, SecondRunTestsNothing) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 21);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
   RecordingVerifier first(edges);
   const GraphMatchResult result = RunLoop(GraphMatchOptions(), ranking, &first);
@@ -534,7 +534,7 @@ TEST(Loop, SecondRunTestsNothing) {
 
 TEST(Loop, APairThatFailedIsTheOnlyOneThatTheNextRunTests) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 21);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
   RecordingVerifier probe(edges);
   RunLoop(GraphMatchOptions(), ranking, &probe);
@@ -559,7 +559,7 @@ TEST(Loop, APairThatFailedIsTheOnlyOneThatTheNextRunTests) {
 
 TEST(Loop, RepeatedAfterOtherMatchersItTestsHardlyAnything) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 22);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   const std::set<ImagePair> edges = ImageEdges(scene, ids);
   RecordingVerifier first(edges);
@@ -574,7 +574,7 @@ TEST(Loop, RepeatedAfterOtherMatchersItTestsHardlyAnything) {
 
 TEST(Loop, NewImagesAreSampledAndOldOnesHardly) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 23);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   const std::set<ImagePair> edges = ImageEdges(scene, ids);
   RecordingVerifier whole(edges);
@@ -658,7 +658,7 @@ TEST(Loop, ImagesThatWereSampledLeaveSamplingToNewOnes) {
 
 TEST(Loop, InterruptedAfterOtherMatchersItEndsAsIfItHadNotBeen) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 22);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   const std::set<ImagePair> edges = ImageEdges(scene, ids);
   std::set<ImagePair> others;
@@ -765,7 +765,7 @@ TEST(Loop, KnownPairsOfUnrankedImagesAreLeftAside) {
 
 TEST(Loop, ProgressGrowsAndEndsAtTheResult) {
   const Scene scene = MakeScene(5, 12, 4, 0.5, 15);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   RecordingVerifier verifier(ImageEdges(scene, ids));
   ThreadPool threads(2);
@@ -786,7 +786,7 @@ TEST(Loop, ProgressGrowsAndEndsAtTheResult) {
 
 TEST(Loop, NeedsAnIdForEveryImage) {
   const Scene scene = MakeScene(1, 4, 1, 0.3, 1);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   RecordingVerifier verifier({});
   ThreadPool threads(1);
   EXPECT_THROW(RunGraphMatch({}, ranking, {1, 2}, verifier, threads, nullptr), OptionsError);
@@ -835,7 +835,7 @@ TEST(Retrieval, TestsTheNearestImagesAndThenNeighborsOfNeighbors) {
   const Scene scene = MakeScene(5, 12, 3, 0.6, 31);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   for (const std::size_t list_length : {3, 512}) {
-    const Ranking ranking = MakeRanking(scene, list_length);
+    const VectorRanking ranking = MakeRanking(scene, list_length);
     for (const int num_images : {1, 4, 1000}) {
       for (const int num_expansions : {0, 2, 50}) {
         RetrievalOptions options;
@@ -856,7 +856,7 @@ TEST(Retrieval, TestsTheNearestImagesAndThenNeighborsOfNeighbors) {
 
 TEST(Retrieval, GoesOnAfterAnInterruption) {
   const Scene scene = MakeScene(5, 12, 3, 0.6, 32);
-  const Ranking ranking = MakeRanking(scene);
+  const VectorRanking ranking = MakeRanking(scene);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   ThreadPool threads(2);
   RetrievalOptions options;

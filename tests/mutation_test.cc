@@ -278,9 +278,9 @@ class Mutation : public ::testing::Test {
     options.colmap_path = FAKE_COLMAP_PATH;
     options.work_path = directory_.Path();
     options.num_threads = 2;
-    options.vectors.gmm.num_components = 2;
-    options.vectors.num_training_descriptors = 200;
-    options.vectors.max_num_features = 30;
+    options.ranking.vectors.gmm.num_components = 2;
+    options.ranking.vectors.num_training_descriptors = 200;
+    options.ranking.vectors.max_num_features = 30;
     options.verification.lock_timeout = 1;
     options.skip_image_pairs_in_same_frame = true;
     options.verification.timeout_per_pair = 2;

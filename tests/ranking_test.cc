@@ -199,12 +199,13 @@ std::vector<float> UnitVectorsWithTies(std::size_t num_vectors, std::size_t dim,
   return vectors;
 }
 
-Ranking MakeRanking(std::size_t num_vertices, std::size_t dim, const std::vector<float>& vectors,
-                    std::size_t list_length = 512, int num_threads = 2) {
+VectorRanking MakeRanking(std::size_t num_vertices, std::size_t dim,
+                          const std::vector<float>& vectors, std::size_t list_length = 512,
+                          int num_threads = 2) {
   ThreadPool threads(num_threads);
   RankingOptions options;
   options.list_length = list_length;
-  return Ranking(options, num_vertices, dim, vectors, threads);
+  return VectorRanking(options, num_vertices, dim, vectors, threads);
 }
 
 double ReferenceDistance(const std::vector<float>& vectors, std::size_t dim, Vertex a, Vertex b) {
@@ -220,7 +221,7 @@ TEST_P(RankingTest, DistancesAreThoseOfTheReference) {
   constexpr std::size_t kNumVertices = 30;
   for (const std::size_t dim : {1u, 15u, 16u, 33u, 600u, 4096u}) {
     const std::vector<float> vectors = UnitVectors(kNumVertices, dim, 11);
-    const Ranking ranking = MakeRanking(kNumVertices, dim, vectors);
+    const VectorRanking ranking = MakeRanking(kNumVertices, dim, vectors);
     ASSERT_EQ(ranking.NumVertices(), kNumVertices);
     for (Vertex a = 0; a < kNumVertices; ++a) {
       for (Vertex b = 0; b < kNumVertices; ++b) {
@@ -242,7 +243,7 @@ TEST_P(RankingTest, ListsAreSortedByDistanceThenByNumber) {
       for (std::size_t i = 0; i < num_vertices; i += 7) {
         std::copy_n(vectors.begin(), dim, vectors.begin() + static_cast<std::ptrdiff_t>(i * dim));
       }
-      const Ranking ranking = MakeRanking(num_vertices, dim, vectors);
+      const VectorRanking ranking = MakeRanking(num_vertices, dim, vectors);
       for (Vertex vertex = 0; vertex < num_vertices; ++vertex) {
         std::vector<std::pair<double, Vertex>> order;
         for (Vertex other = 0; other < num_vertices; ++other) {
@@ -277,7 +278,7 @@ TEST_P(RankingTest, ListsAgreeWithDistancesComputedOneByOne) {
     for (std::size_t i = 0; i < kNumVertices; ++i) {
       for (std::size_t d = 0; d < dim; ++d) padded[i * padded_dim + d] = vectors[i * dim + d];
     }
-    const Ranking ranking = MakeRanking(kNumVertices, dim, vectors);
+    const VectorRanking ranking = MakeRanking(kNumVertices, dim, vectors);
     for (Vertex vertex = 0; vertex < kNumVertices; ++vertex) {
       std::vector<std::pair<float, Vertex>> order;
       for (Vertex other = 0; other < kNumVertices; ++other) {
@@ -305,7 +306,7 @@ TEST_P(RankingTest, ShortListsAreTheBeginningOfTheLongOnes) {
   constexpr std::size_t kDim = 24;
   const std::vector<float> vectors = UnitVectorsWithTies(kNumVertices, kDim, 14);
   for (const std::size_t list_length : {0u, 1u, 2u, 50u, 98u, 99u, 100u, 1000u}) {
-    const Ranking ranking = MakeRanking(kNumVertices, kDim, vectors, list_length);
+    const VectorRanking ranking = MakeRanking(kNumVertices, kDim, vectors, list_length);
     for (Vertex vertex = 0; vertex < kNumVertices; ++vertex) {
       std::vector<Vertex> all = ranking.AllOf(vertex);
       ASSERT_EQ(all.size(), kNumVertices - 1);
@@ -319,9 +320,9 @@ TEST_P(RankingTest, IsTheSameForAnyNumberOfThreads) {
   constexpr std::size_t kNumVertices = 500;
   constexpr std::size_t kDim = 100;
   const std::vector<float> vectors = UnitVectors(kNumVertices, kDim, 15);
-  const Ranking expected = MakeRanking(kNumVertices, kDim, vectors, 40, 1);
+  const VectorRanking expected = MakeRanking(kNumVertices, kDim, vectors, 40, 1);
   for (const int num_threads : {2, 3, 16}) {
-    const Ranking ranking = MakeRanking(kNumVertices, kDim, vectors, 40, num_threads);
+    const VectorRanking ranking = MakeRanking(kNumVertices, kDim, vectors, 40, num_threads);
     for (Vertex vertex = 0; vertex < kNumVertices; ++vertex) {
       ASSERT_EQ(ranking.NearestOf(vertex), expected.NearestOf(vertex)) << num_threads;
     }
@@ -334,14 +335,14 @@ TEST_P(RankingTest, VectorsThatAreAllEqualAreRankedByNumber) {
   for (std::size_t i = 0; i < kNumVertices; ++i) {
     vectors.insert(vectors.end(), {0.6F, 0.8F, 0});
   }
-  const Ranking ranking = MakeRanking(kNumVertices, 3, vectors, 5);
+  const VectorRanking ranking = MakeRanking(kNumVertices, 3, vectors, 5);
   EXPECT_THAT(ranking.NearestOf(0), ElementsAre(1, 2, 3, 4, 5));
   EXPECT_THAT(ranking.NearestOf(3), ElementsAre(0, 1, 2, 4, 5));
   EXPECT_THAT(ranking.NearestOf(59), ElementsAre(0, 1, 2, 3, 4));
 }
 
 TEST_P(RankingTest, OneVertexHasNoOthers) {
-  const Ranking ranking = MakeRanking(1, 3, {1, 0, 0});
+  const VectorRanking ranking = MakeRanking(1, 3, {1, 0, 0});
   EXPECT_EQ(ranking.NumVertices(), 1u);
   EXPECT_THAT(ranking.NearestOf(0), IsEmpty());
   EXPECT_THAT(ranking.AllOf(0), IsEmpty());
@@ -349,7 +350,7 @@ TEST_P(RankingTest, OneVertexHasNoOthers) {
 }
 
 TEST_P(RankingTest, TwoVerticesHaveEachOther) {
-  const Ranking ranking = MakeRanking(2, 2, {1, 0, -1, 0});
+  const VectorRanking ranking = MakeRanking(2, 2, {1, 0, -1, 0});
   EXPECT_THAT(ranking.NearestOf(0), ElementsAre(1));
   EXPECT_THAT(ranking.NearestOf(1), ElementsAre(0));
   EXPECT_THAT(ranking.AllOf(0), ElementsAre(1));
@@ -363,9 +364,9 @@ TEST(RankingStopTest, StopsOnRequest) {
   const std::vector<float> vectors = UnitVectors(100, 16, 16);
   ThreadPool threads(2);
   StopRequest stop;
-  EXPECT_EQ(Ranking({}, 100, 16, vectors, threads, &stop).NumVertices(), 100u);
+  EXPECT_EQ(VectorRanking({}, 100, 16, vectors, threads, &stop).NumVertices(), 100u);
   stop.Raise();
-  EXPECT_THROW(Ranking({}, 100, 16, vectors, threads, &stop), StoppedError);
+  EXPECT_THROW(VectorRanking({}, 100, 16, vectors, threads, &stop), StoppedError);
 }
 
 TEST(RankingOptionsTest, KeepsLongListsByDefault) { EXPECT_EQ(RankingOptions().list_length, 512u); }

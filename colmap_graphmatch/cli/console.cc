@@ -192,12 +192,17 @@ std::string FormatSummary(const PipelineResult& result) {
                         matching.failed_pairs.size());
   }
   text += FormatVerification(result.verification);
+  if (result.replayed) {
+    text += fmt::format("Replayed           matching and verification would have taken some {}\n",
+                        FormatDuration(result.modelled_seconds));
+  }
   text += fmt::format("Time               {}", FormatDuration(result.total_seconds));
   if (!listed) {
-    text += fmt::format(
-        " (mixture {}, Fisher vectors {}, ranking {}, matching {})",
-        FormatDuration(result.mixture_seconds), FormatDuration(result.vectors_seconds),
-        FormatDuration(result.ranking_seconds), FormatDuration(result.matching_seconds));
+    text += fmt::format(" (mixture {}, Fisher vectors {}, ranking {}, matching {})",
+                        FormatDuration(result.preprocessing_seconds.mixture),
+                        FormatDuration(result.preprocessing_seconds.vectors),
+                        FormatDuration(result.preprocessing_seconds.ranking),
+                        FormatDuration(result.matching_seconds));
   }
   text += '\n';
   return text;

@@ -15,6 +15,7 @@
 #include "colmap_graphmatch/cli/exit_codes.h"
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/report/json_report.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -61,6 +62,7 @@ int Run(const CommandLine& line) {
   try {
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
     console.ClearProgress();
+    if (!line.report_path.empty()) WriteJsonReport(line.report_path, line.pipeline, result);
     std::cout << FormatSummary(result) << std::flush;
     WarnIfNotWritten(std::cout);
     if (result.matching.finished) return kExitSuccess;

@@ -164,6 +164,7 @@ class Table {
     AddVectors();
     AddMatching();
     AddWork();
+    AddEvaluation();
     AddColmapMatching();
     AddUnusedOptions();
     return std::move(rows_);
@@ -274,6 +275,7 @@ class Table {
   void AddVectors();
   void AddMatching();
   void AddWork();
+  void AddEvaluation();
   void AddColmapMatching();
   void AddUnusedOptions();
 
@@ -356,7 +358,8 @@ void Table::AddGraph() {
 }
 
 void Table::AddVectors() {
-  ImageVectorOptions& vectors = line_->pipeline.vectors;
+  ImageRankingOptions& ranking = line_->pipeline.ranking;
+  ImageVectorOptions& vectors = ranking.vectors;
   Section("GraphMatch: how images are described");
   Add("GraphMatching.num_components", IntOf(&vectors.gmm.num_components, 1),
       "Gaussians (>= 1) of the mixture; time and memory grow in proportion");
@@ -366,6 +369,9 @@ void Table::AddVectors() {
       "which, if it has more: those of the largest scales, or random ones");
   Add("GraphMatching.num_training_descriptors", IntOf(&vectors.num_training_descriptors, 1),
       "descriptors (>= 1) that the mixture is learnt from");
+  Add("GraphMatching.ranking_path", TextOf(&ranking.ranking_path, "the path of ranked lists"),
+      "a file of ranked images instead, e.g. of a vocabulary tree: image, other image and score a "
+      "line, separated by tabs; greater scores are nearer");
 }
 
 void Table::AddMatching() {
@@ -400,6 +406,26 @@ void Table::AddWork() {
       "seconds (>= 0) to wait while another program locks the database");
   Add("GraphMatching.work_path", TextOf(&p.work_path, "the path of a directory"),
       "where temporary files go (default: $TMPDIR or /tmp); some 100 MB a process");
+}
+
+void Table::AddEvaluation() {
+  PipelineOptions& p = line_->pipeline;
+  Section("GraphMatch: what a run tells, and how it is compared with others");
+  Add("GraphMatching.report", TextOf(&line_->report_path, "the path of a file"),
+      "a JSON file to write with what was found and what it cost");
+  Add("GraphMatching.test_log", TextOf(&p.test_log_path, "the path of a file"),
+      "a CSV file to write with every pair that is tested");
+  Add("GraphMatching.replay_path",
+      TextOf(&p.replay_path, "the path of a matched COLMAP database or a list of edges"),
+      "a finished matching graph that answers instead of COLMAP, to compare options in seconds: a "
+      "matched COLMAP database, or lines of two images and their inliers, separated by tabs. "
+      "Nothing is written to the database");
+  Add("GraphMatching.replay_matching_cost",
+      DoubleOf(&p.replay_costs.seconds_per_million_products, Zero::kAllowed),
+      "seconds (>= 0) of one core that a replay counts for a million products of descriptors");
+  Add("GraphMatching.replay_verification_cost",
+      DoubleOf(&p.replay_costs.seconds_per_verification, Zero::kAllowed),
+      "seconds (>= 0) of one core that it counts for a pair with enough matches to be verified");
 }
 
 void Table::AddColmapMatching() {

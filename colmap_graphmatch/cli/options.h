@@ -14,6 +14,7 @@ struct CommandLine {
   bool help = false;
   bool version = false;
   std::filesystem::path project_path;
+  std::filesystem::path report_path;
   bool seed_from_clock = false;
   bool lightglue = false;  // The matcher's type is SIFT_LIGHTGLUE.
   // What is to be said about options of vocab_tree_matcher that were given and have no meaning

@@ -432,6 +432,20 @@ std::vector<TestedPair> Database::ReadTestedPairs() {
   return tested;
 }
 
+std::unordered_map<ImagePair, std::size_t> Database::ReadNumMatches() {
+  sqlite::Statement select(connection_, "SELECT pair_id, rows FROM matches ORDER BY pair_id");
+  std::unordered_map<ImagePair, std::size_t> num_matches;
+  AscendingKeys keys;
+  while (select.Step()) {
+    if (!keys.Add(select.Int(0))) ThrowDamaged("the keys of matches do not ascend");
+    const auto pair_id = static_cast<PairId>(select.Int(0));
+    if (!IsColmapsKey(pair_id)) continue;
+    num_matches[DecodePair(pair_id)] =
+        static_cast<std::size_t>(std::max<std::int64_t>(0, select.Int(1)));
+  }
+  return num_matches;
+}
+
 std::vector<ImagePair> Database::ReadUnverifiedPairs() {
   // Every row is looked at here, not by SQLite, so that rows without end are noticed.
   sqlite::Statement select(connection_,

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "colmap_graphmatch/base/types.h"
@@ -86,6 +87,9 @@ class Database {
   // left out. (COLMAP's matchers also ask for
   // a row in `matches` before they skip a pair; what is verified is never verified again here.)
   std::vector<TestedPair> ReadTestedPairs();
+
+  // The number of matches of every pair that has a row in `matches`.
+  std::unordered_map<ImagePair, std::size_t> ReadNumMatches();
 
   // The pairs that have matches, made elsewhere, and no two-view geometry yet, ascending.
   std::vector<ImagePair> ReadUnverifiedPairs();

@@ -96,7 +96,8 @@ StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
     const auto place = std::lower_bound(image_pairs.begin(), image_pairs.end(), verified.pair);
     const VertexPair pair = pairs[static_cast<std::size_t>(place - image_pairs.begin())];
     const bool is_edge = verified.outcome == PairOutcome::kEdge;
-    if (FindPair(verifier_.KnownPairs(), verified.pair) != nullptr) {
+    const bool is_known = FindPair(verifier_.KnownPairs(), verified.pair) != nullptr;
+    if (is_known) {
       ++batch.num_known;
       if (is_edge) ++batch.num_known_edges;
     } else if (verified.outcome == PairOutcome::kFailed) {
@@ -110,7 +111,12 @@ StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
     tested.push_back({pair, is_edge});
     batch.seconds = stopwatch.Seconds();
     Total(stage) = before + batch;
-    Report(stage, iteration, batch.num_edges + batch.num_known_edges,
+    LoopProgress progress;
+    progress.stage = stage;
+    progress.iteration = iteration;
+    progress.last = verified;
+    progress.last_is_known = is_known;
+    Report(progress, batch.num_edges + batch.num_known_edges,
            static_cast<double>(pairs.size() - tested.size()) + num_future_tests);
   });
   batch.seconds = stopwatch.Seconds();
@@ -121,12 +127,9 @@ StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
   return batch;
 }
 
-void GraphBuilder::Report(LoopStage stage, int iteration, std::size_t num_edges_in_batch,
+void GraphBuilder::Report(LoopProgress progress, std::size_t num_edges_in_batch,
                           double num_remaining_tests) {
   if (!on_progress_) return;
-  LoopProgress progress;
-  progress.stage = stage;
-  progress.iteration = iteration;
   progress.all = result_.All();
   progress.num_edges = graph_.NumEdges() + num_edges_in_batch;
   progress.num_components = components_.Count();

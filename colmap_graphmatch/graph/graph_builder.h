@@ -42,8 +42,7 @@ class GraphBuilder {
   std::vector<TestedVertexPair> KnownOutsideGraph() const;
   bool AddSeeds(const std::vector<TestedVertexPair>& seeds);
   StageStatistics& Total(LoopStage stage);
-  void Report(LoopStage stage, int iteration, std::size_t num_edges_in_batch,
-              double num_remaining_tests);
+  void Report(LoopProgress progress, std::size_t num_edges_in_batch, double num_remaining_tests);
 
   const std::vector<ImageId>& image_ids_;
   PairVerifier& verifier_;

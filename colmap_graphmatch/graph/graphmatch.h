@@ -42,8 +42,10 @@ struct IterationStatistics {
 struct LoopProgress {
   LoopStage stage = LoopStage::kSampling;
   int iteration = 0;
-  StageStatistics all;        // Of all stages together.
-  std::size_t num_edges = 0;  // Of the whole graph, those of earlier runs included.
+  VerifiedPair last;           // The pair,
+  bool last_is_known = false;  // which an earlier run had tested.
+  StageStatistics all;         // Of all stages together.
+  std::size_t num_edges = 0;   // Of the whole graph, those of earlier runs included.
   std::size_t num_components = 0;
   std::size_t largest_component = 0;
   std::size_t num_isolated = 0;

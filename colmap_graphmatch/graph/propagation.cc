@@ -1,36 +1,85 @@
 #include "colmap_graphmatch/graph/propagation.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <limits>
 #include <utility>
 
 namespace colmap_graphmatch {
 namespace {
 
-// Edges a parallel task: enough work to make up for starting it.
-constexpr std::size_t kEdgesPerTask = 64;
+// Vertices a parallel task: enough work to make up for the arrays of SourceCandidates.
+constexpr std::size_t kVerticesPerTask = 128;
 
-// What (a, b) proposes: pairs of a with neighbours of b.
-void PropagateAlong(Vertex a, Vertex b, const GraphMatchOptions& options, const Ranking& ranking,
-                    const MatchingGraph& graph, std::vector<VertexPair>* pairs) {
-  if (!options.restrictions.Seeks(a)) return;
-  if (graph.Degree(a) >= static_cast<std::size_t>(options.max_num_neighbors)) return;
-  std::vector<std::pair<float, Vertex>> candidates;
-  for (const Vertex c : graph.Neighbors(b)) {
-    if (c == a || options.restrictions.SameFrame(a, c)) continue;
-    if (options.propagate_untested_only && graph.IsTested(a, c)) continue;
-    const bool from_source =
-        options.propagation_distance == GraphMatchOptions::PropagationDistance::kSource;
-    candidates.emplace_back(ranking.Distance(from_source ? a : b, c), c);
-  }
-  const auto num = static_cast<std::ptrdiff_t>(
-      std::min(candidates.size(), static_cast<std::size_t>(options.num_to_propagate)));
-  std::partial_sort(candidates.begin(), candidates.begin() + num, candidates.end());
-  for (auto candidate = candidates.begin(); candidate != candidates.begin() + num; ++candidate) {
-    if (!graph.IsTested(a, candidate->second)) {
-      pairs->push_back(MakeVertexPair(a, candidate->second));
+constexpr Vertex kNoVertex = std::numeric_limits<Vertex>::max();
+
+// What is known of the pairs of one vertex with others. Neighbours of a vertex have most of their
+// neighbours in common, so a pair comes up many times in one iteration, and its distance is a
+// product of two long vectors.
+class SourceCandidates {
+ public:
+  SourceCandidates(const GraphMatchOptions& options, const Ranking& ranking,
+                   const MatchingGraph& graph)
+      : options_(options),
+        ranking_(ranking),
+        graph_(graph),
+        source_of_(ranking.NumVertices(), kNoVertex),
+        entries_(ranking.NumVertices()) {}
+
+  // What (a, b) proposes, for b among `neighbors` of a: pairs of a with neighbours of b.
+  void Propagate(Vertex a, const std::vector<Vertex>& neighbors, std::vector<VertexPair>* pairs) {
+    if (!options_.restrictions.Seeks(a)) return;
+    if (graph_.Degree(a) >= static_cast<std::size_t>(options_.max_num_neighbors)) return;
+    for (const Vertex b : neighbors) {
+      candidates_.clear();
+      for (const Vertex c : graph_.Neighbors(b)) {
+        if (c == a) continue;
+        const Entry& entry = Get(a, c);
+        if (!entry.is_candidate) continue;
+        const bool from_source =
+            options_.propagation_distance == GraphMatchOptions::PropagationDistance::kSource;
+        candidates_.emplace_back(from_source ? entry.distance : ranking_.Distance(b, c), c);
+      }
+      const auto num = static_cast<std::ptrdiff_t>(
+          std::min(candidates_.size(), static_cast<std::size_t>(options_.num_to_propagate)));
+      std::partial_sort(candidates_.begin(), candidates_.begin() + num, candidates_.end());
+      for (auto candidate = candidates_.begin(); candidate != candidates_.begin() + num;
+           ++candidate) {
+        if (!entries_[candidate->second].is_tested) {
+          pairs->push_back(MakeVertexPair(a, candidate->second));
+        }
+      }
     }
   }
-}
+
+ private:
+  struct Entry {
+    float distance = 0;  // d(a, c), of candidates if it is asked for.
+    bool is_tested = false;
+    bool is_candidate = false;
+  };
+
+  const Entry& Get(Vertex a, Vertex c) {
+    Entry& entry = entries_[c];
+    if (source_of_[c] == a) return entry;
+    source_of_[c] = a;
+    entry.is_tested = graph_.IsTested(a, c);
+    entry.is_candidate = !options_.restrictions.SameFrame(a, c) &&
+                         !(options_.propagate_untested_only && entry.is_tested);
+    if (entry.is_candidate &&
+        options_.propagation_distance == GraphMatchOptions::PropagationDistance::kSource) {
+      entry.distance = ranking_.Distance(a, c);
+    }
+    return entry;
+  }
+
+  const GraphMatchOptions& options_;
+  const Ranking& ranking_;
+  const MatchingGraph& graph_;
+  std::vector<Vertex> source_of_;  // By c: the vertex a that its entry belongs to.
+  std::vector<Entry> entries_;     // By c.
+  std::vector<std::pair<float, Vertex>> candidates_;
+};
 
 }  // namespace
 
@@ -39,15 +88,24 @@ std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Rankin
                                   ThreadPool& threads) {
   const std::vector<VertexPair>& edges = graph.Edges();
   if (first_edge >= edges.size()) return {};
-  const std::size_t num_tasks = (edges.size() - first_edge + kEdgesPerTask - 1) / kEdgesPerTask;
+  const std::size_t num_vertices = graph.NumVertices();
+  std::vector<std::vector<Vertex>> new_neighbors;
+  if (first_edge > 0) {
+    new_neighbors.resize(num_vertices);
+    for (std::size_t i = first_edge; i < edges.size(); ++i) {
+      new_neighbors[edges[i].first].push_back(edges[i].second);
+      new_neighbors[edges[i].second].push_back(edges[i].first);
+    }
+  }
+  const std::size_t num_tasks = (num_vertices + kVerticesPerTask - 1) / kVerticesPerTask;
   std::vector<std::vector<VertexPair>> proposals(num_tasks);
   threads.ParallelFor(num_tasks, [&](std::size_t task) {
-    const std::size_t begin = first_edge + task * kEdgesPerTask;
-    const std::size_t end = std::min(begin + kEdgesPerTask, edges.size());
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto [a, b] = edges[i];
-      PropagateAlong(a, b, options, ranking, graph, &proposals[task]);
-      PropagateAlong(b, a, options, ranking, graph, &proposals[task]);
+    SourceCandidates candidates(options, ranking, graph);
+    const std::size_t end = std::min((task + 1) * kVerticesPerTask, num_vertices);
+    for (std::size_t i = task * kVerticesPerTask; i < end; ++i) {
+      const auto a = static_cast<Vertex>(i);
+      candidates.Propagate(a, first_edge > 0 ? new_neighbors[i] : graph.Neighbors(a),
+                           &proposals[task]);
     }
   });
   return UniteProposals(proposals);

@@ -8,9 +8,10 @@
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/graph/retrieval.h"
-#include "colmap_graphmatch/pipeline/image_vectors.h"
-#include "colmap_graphmatch/ranking/ranking.h"
+#include "colmap_graphmatch/pipeline/image_ranking.h"
+#include "colmap_graphmatch/pipeline/observer.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
+#include "colmap_graphmatch/verification/replay_verifier.h"
 
 namespace colmap_graphmatch {
 
@@ -47,8 +48,8 @@ struct PipelineOptions {
   // Of everything random. The same seed, input and options give the same tested pairs.
   std::uint64_t seed = 0;
 
-  ImageVectorOptions vectors;
-  RankingOptions ranking;
+  // vectors.seed and vectors.gmm.seed are `seed`.
+  ImageRankingOptions ranking;
   GraphMatchOptions graph;
 
   // Images that kRetrieval and kBriad retrieve for each; 0: 120, for kBriad 40, as in the paper.
@@ -56,17 +57,17 @@ struct PipelineOptions {
   int num_expansions = 4;
   ColmapVerifierOptions verification;
 
+  // Answers pairs from this finished matching graph (see finished_graph.h) instead of having COLMAP
+  // verify them, unless it is empty. Nothing is written to the database, and what it knows of pairs
+  // is not used.
+  std::filesystem::path replay_path;
+  ReplayCosts replay_costs;
+
+  // Writes every tested pair to this CSV file (see test_log.h), unless it is empty.
+  std::filesystem::path test_log_path;
+
   // Throws OptionsError.
   void Check() const;
-};
-
-// What a run tells while it goes on. Called on the thread that called RunPipeline.
-class PipelineObserver {
- public:
-  virtual ~PipelineObserver() = default;
-  virtual void OnInfo(const std::string& message) = 0;
-  virtual void OnWarning(const std::string& message) = 0;
-  virtual void OnProgress(const LoopProgress& progress) = 0;
 };
 
 struct PipelineResult {
@@ -75,10 +76,11 @@ struct PipelineResult {
   bool listed = false;  // The pairs were given, all or a list: no sampling, no propagation.
   GraphMatchResult matching;
   VerifierStatistics verification;
-  double mixture_seconds = 0;
-  double vectors_seconds = 0;
-  double ranking_seconds = 0;
-  double matching_seconds = 0;
+  int num_threads = 1;
+  bool replayed = false;
+  ImageRankingSeconds preprocessing_seconds;
+  double matching_seconds = 0;  // Of the loop or the list, with verification.
+  double modelled_seconds = 0;  // What verification would have taken that was replayed.
   double total_seconds = 0;
 };
 

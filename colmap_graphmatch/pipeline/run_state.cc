@@ -139,6 +139,11 @@ void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFinger
                  std::to_string(options.seed) + " " + std::to_string(gmm.seed);
 }
 
+void RunState::SelectGiven(const std::string& ranking_key, std::vector<ImageFingerprint> images) {
+  images_ = std::move(images);
+  vectors_key_ = ranking_key;
+}
+
 std::vector<ImageId> RunState::FindChanged() {
   std::vector<ImageId> changed;
   Try([&] { changed = file_->FindChanged(images_); });

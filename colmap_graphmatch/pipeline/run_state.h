@@ -30,6 +30,10 @@ class RunState {
   // Chooses what is kept: vectors of these images under these options.
   void Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images);
 
+  // The same for a ranking that was given from outside and described by `ranking_key`: nothing but
+  // the seeds is kept, and what is there of vectors stays.
+  void SelectGiven(const std::string& ranking_key, std::vector<ImageFingerprint> images);
+
   // The selected images whose features are not those of the last run.
   std::vector<ImageId> FindChanged();
 

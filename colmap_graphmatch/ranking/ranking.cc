@@ -35,8 +35,9 @@ std::vector<Vertex> Nearest(const float* products, std::size_t num_vertices, Ver
 
 }  // namespace
 
-Ranking::Ranking(const RankingOptions& options, std::size_t num_vertices, std::size_t dim,
-                 std::vector<float> vectors, ThreadPool& threads, const StopRequest* stop)
+VectorRanking::VectorRanking(const RankingOptions& options, std::size_t num_vertices,
+                             std::size_t dim, std::vector<float> vectors, ThreadPool& threads,
+                             const StopRequest* stop)
     : num_vertices_(num_vertices),
       padded_dim_((dim + kRowPadding - 1) / kRowPadding * kRowPadding),
       lists_(num_vertices) {
@@ -63,13 +64,13 @@ Ranking::Ranking(const RankingOptions& options, std::size_t num_vertices, std::s
   });
 }
 
-float Ranking::Distance(Vertex a, Vertex b) const {
+float VectorRanking::Distance(Vertex a, Vertex b) const {
   float product = 0;
   DotProducts(Row(a), 1, Row(b), 1, padded_dim_, &product, 1);
   return 2 - 2 * product;
 }
 
-std::vector<Vertex> Ranking::AllOf(Vertex vertex) const {
+std::vector<Vertex> VectorRanking::AllOf(Vertex vertex) const {
   std::vector<float> products(num_vertices_);
   DotProducts(Row(vertex), 1, Row(0), num_vertices_, padded_dim_, products.data(), num_vertices_);
   return Nearest(products.data(), num_vertices_, vertex, num_vertices_);

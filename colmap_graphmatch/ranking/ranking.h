@@ -19,28 +19,45 @@ struct RankingOptions {
   std::size_t list_length = 512;
 };
 
-// For every image the others by ascending distance d = |x - y|^2 = 2 - 2 x.y of their unit-length
-// vectors (GraphMatch, section 3.1), ties by ascending number. Computed by blocked matrix products,
-// never as an N x N matrix. Results are bitwise the same for any number of threads, and lists agree
-// with distances computed one by one. Const members are thread-safe.
+// For every image the others, those that look most alike first. Const members are thread-safe.
 class Ranking {
+ public:
+  virtual ~Ranking() = default;
+
+  virtual std::size_t NumVertices() const = 0;
+
+  // How different two images look; smaller is nearer.
+  virtual float Distance(Vertex a, Vertex b) const = 0;
+
+  // The nearest others, nearest first: as many as are kept.
+  virtual const std::vector<Vertex>& NearestOf(Vertex vertex) const = 0;
+
+  // All others that are ranked, nearest first; NearestOf(vertex) is its beginning. May take O(N) on
+  // every call.
+  virtual std::vector<Vertex> AllOf(Vertex vertex) const = 0;
+};
+
+// By ascending distance d = |x - y|^2 = 2 - 2 x.y of the images' unit-length vectors (GraphMatch,
+// section 3.1), ties by ascending number. Computed by blocked matrix products, never as an N x N
+// matrix. Results are bitwise the same for any number of threads, and lists agree with distances
+// computed one by one.
+class VectorRanking : public Ranking {
  public:
   // vectors: N rows of dim floats of unit length, row-major. Throws StoppedError if stop (may be
   // null) asks for it.
-  Ranking(const RankingOptions& options, std::size_t num_vertices, std::size_t dim,
-          std::vector<float> vectors, ThreadPool& threads, const StopRequest* stop = nullptr);
+  VectorRanking(const RankingOptions& options, std::size_t num_vertices, std::size_t dim,
+                std::vector<float> vectors, ThreadPool& threads, const StopRequest* stop = nullptr);
 
-  std::size_t NumVertices() const { return num_vertices_; }
+  std::size_t NumVertices() const override { return num_vertices_; }
 
   // In [0, 4], up to rounding.
-  float Distance(Vertex a, Vertex b) const;
+  float Distance(Vertex a, Vertex b) const override;
 
-  // The nearest others, at most list_length of them, nearest first.
-  const std::vector<Vertex>& NearestOf(Vertex vertex) const { return lists_[vertex]; }
+  // At most list_length.
+  const std::vector<Vertex>& NearestOf(Vertex vertex) const override { return lists_[vertex]; }
 
-  // All others, nearest first; NearestOf(vertex) is its beginning. Computed on every call: O(N
-  // dim).
-  std::vector<Vertex> AllOf(Vertex vertex) const;
+  // Computed on every call: O(N dim).
+  std::vector<Vertex> AllOf(Vertex vertex) const override;
 
  private:
   const float* Row(std::size_t row) const { return vectors_.data() + row * padded_dim_; }

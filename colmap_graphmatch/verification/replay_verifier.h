@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <unordered_map>
@@ -10,15 +11,40 @@
 
 namespace colmap_graphmatch {
 
-// Answers from a finished matching graph instead of matching: pairs among the edges are edges, all
-// others are not. For tests and for comparing strategies on the same truth.
+// What a finished matching graph knows of a pair.
+struct ReplayedPair {
+  std::uint32_t num_inliers = 0;
+  bool is_edge = false;
+  bool is_verified = true;  // The pair had enough matches for the geometric verification.
+};
+
+// What testing a pair costs, in seconds of one core. Measured with the exact matcher and COLMAP 3.8
+// on photos with some 1,900 features each (docs/benchmarks.md).
+struct ReplayCosts {
+  double seconds_per_million_products = 6.1e-4;  // Of matching n1 with n2 descriptors: n1 n2.
+  double seconds_per_verification = 0.009;
+};
+
+// Answers from a finished matching graph instead of matching: pairs among the given ones as they
+// are, all others are no edges and have too few matches to be verified. For tests and for comparing
+// strategies on the same truth.
 class ReplayVerifier : public PairVerifier {
  public:
+  explicit ReplayVerifier(std::unordered_map<ImagePair, ReplayedPair> pairs);
+
   // Edges and their numbers of inliers.
-  explicit ReplayVerifier(std::unordered_map<ImagePair, std::uint32_t> edges);
+  explicit ReplayVerifier(const std::unordered_map<ImagePair, std::uint32_t>& edges);
 
   // Makes pairs known that were tested before the run; their outcomes come from the edges.
   void SetKnownPairs(std::vector<ImagePair> pairs);
+
+  // num_features: of every image that is asked for. Without this, tests cost nothing.
+  void SetCosts(const ReplayCosts& costs, std::unordered_map<ImageId, std::size_t> num_features,
+                int num_threads);
+
+  // What the answered pairs would have taken, shared by the threads evenly. Also counts the pair
+  // that is being reported.
+  double ModelledSeconds() const { return modelled_seconds_; }
 
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_pairs_; }
   bool Verify(const std::vector<ImagePair>& pairs,
@@ -26,9 +52,14 @@ class ReplayVerifier : public PairVerifier {
 
  private:
   VerifiedPair Answer(const ImagePair& pair) const;
+  double Cost(const ImagePair& pair) const;
 
-  std::unordered_map<ImagePair, std::uint32_t> edges_;
+  std::unordered_map<ImagePair, ReplayedPair> pairs_;
   std::vector<VerifiedPair> known_pairs_;
+  ReplayCosts costs_;
+  std::unordered_map<ImageId, std::size_t> num_features_;
+  int num_threads_ = 1;
+  double modelled_seconds_ = 0;
 };
 
 }  // namespace colmap_graphmatch

@@ -84,11 +84,11 @@ void Main(const std::string& database_path, const std::string& edges_path) {
     std::vector<float> vectors =
         EncodeImages(options, training.mixture, database, images, threads, StopRequest());
     const std::size_t dim = vectors.size() / images.size();
-    return Ranking(RankingOptions(), images.size(), dim, std::move(vectors), threads);
+    return VectorRanking(RankingOptions(), images.size(), dim, std::move(vectors), threads);
   };
 
   ImageVectorOptions vector_options;
-  const Ranking ranking = rank(vector_options);
+  const VectorRanking ranking = rank(vector_options);
   const auto with = [&](const std::string& name,
                         const std::function<void(GraphMatchOptions*)>& change) {
     GraphMatchOptions options;

@@ -1,0 +1,66 @@
+#include "colmap_graphmatch/pipeline/test_log.h"
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "colmap_graphmatch/base/errors.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// Quoted if it has to be (RFC 4180).
+std::string CsvField(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string field = "\"";
+  for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return field + "\"";
+}
+
+}  // namespace
+
+const char* StageName(LoopStage stage) {
+  switch (stage) {
+    case LoopStage::kSampling:
+      return "sampling";
+    case LoopStage::kPropagation:
+      return "propagation";
+    case LoopStage::kRetrieval:
+      return "retrieval";
+    case LoopStage::kExpansion:
+      return "expansion";
+    case LoopStage::kListed:
+      break;
+  }
+  return "listed";
+}
+
+TestLog::TestLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images)
+    : path_(path), file_(path, std::ios::trunc) {
+  for (const ImageRecord& image : images) names_[image.id] = CsvField(image.name);
+  file_ << "test,seconds,stage,iteration,image1,image2,inliers,edge\n" << std::flush;
+  if (!file_) ThrowCannotWrite();
+}
+
+void TestLog::ThrowCannotWrite() const {
+  throw FileError("Cannot write the log of tests " + path_.string() + ": " + std::strerror(errno) +
+                  ".");
+}
+
+void TestLog::Write(const LoopProgress& progress, double seconds) {
+  if (progress.last_is_known || progress.last.outcome == PairOutcome::kFailed) return;
+  std::array<char, 32> time = {};
+  std::snprintf(time.data(), time.size(), "%.4f", seconds);
+  file_ << ++num_written_ << ',' << time.data() << ',' << StageName(progress.stage) << ','
+        << progress.iteration << ',' << names_.at(progress.last.pair.id1) << ','
+        << names_.at(progress.last.pair.id2) << ',' << progress.last.num_inliers << ','
+        << (progress.last.outcome == PairOutcome::kEdge ? 1 : 0) << '\n';
+}
+
+void TestLog::Close() {
+  file_.close();
+  if (!file_) ThrowCannotWrite();
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/graph/graphmatch.h"
+
+namespace colmap_graphmatch {
+
+// The lower-case word for a stage in logs and reports.
+const char* StageName(LoopStage stage);
+
+// Writes every pair that a run tests to a CSV file (docs/formats.md), in the order of the answers.
+class TestLog {
+ public:
+  // Throws FileError if the file cannot be written.
+  TestLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
+
+  // The pair that the progress reports, unless an earlier run had tested it.
+  void Write(const LoopProgress& progress, double seconds);
+
+  // Throws FileError if not everything could be written.
+  void Close();
+
+ private:
+  [[noreturn]] void ThrowCannotWrite() const;
+
+  std::filesystem::path path_;
+  std::ofstream file_;
+  std::map<ImageId, std::string> names_;  // As fields of CSV.
+  std::size_t num_written_ = 0;
+};
+
+}  // namespace colmap_graphmatch

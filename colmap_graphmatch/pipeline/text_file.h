@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "colmap_graphmatch/database/database.h"
+
+namespace colmap_graphmatch {
+
+// A line of a text file, without the spaces at its ends.
+struct Line {
+  std::size_t number = 0;
+  std::string text;
+};
+
+// The lines of a list, without empty ones and those that start with '#'. kind and content say in
+// errors what the list is. Throws FileError if the file cannot be read or has no such line.
+std::vector<Line> ReadLines(const std::filesystem::path& path, const std::string& kind,
+                            const std::string& content);
+
+// The images with features.
+std::unordered_map<std::string, ImageId> IdsByName(const std::vector<ImageRecord>& images);
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,268 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/pipeline/finished_graph.h"
+#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/ranked_lists.h"
+#include "colmap_graphmatch/report/json_report.h"
+#include "tests/support/synthetic_database.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::ThrowsMessage;
+
+std::string ReadFile(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+class TextFileTest : public ::testing::Test {
+ protected:
+  std::filesystem::path Write(const std::string& text) {
+    std::ofstream(path_) << text;
+    return path_;
+  }
+
+  TestDirectory directory_;
+  std::filesystem::path path_ = directory_.Path() / "file.tsv";
+  std::vector<ImageRecord> images_ = {
+      {1, "a.jpg", 1}, {2, "b b.jpg", 1}, {4, "c.jpg", 1}, {5, "none.jpg", 0}};
+};
+
+class FinishedGraphTest : public TextFileTest {
+ protected:
+  FinishedGraph Read(const std::string& text) {
+    return ReadFinishedGraph(Write(text), images_, 15, 1);
+  }
+};
+
+TEST_F(FinishedGraphTest, LinesOfEdges) {
+  const FinishedGraph graph = Read(
+      "# a comment\nphoto1\tphoto2\tinliers\tconfig\tmatches\n"
+      "b b.jpg\ta.jpg\t20\t3\t50\na.jpg\tc.jpg\t30\t1\t40\nb b.jpg\tc.jpg\t10\t2\t12\n"
+      "a.jpg\tnone.jpg\t20\t3\t50\n");
+  ASSERT_THAT(graph.pairs, SizeIs(3));
+  const ReplayedPair& edge = graph.pairs.at(ImagePair(1, 2));
+  EXPECT_TRUE(edge.is_edge);
+  EXPECT_TRUE(edge.is_verified);
+  EXPECT_EQ(edge.num_inliers, 20U);
+  const ReplayedPair& degenerate = graph.pairs.at(ImagePair(1, 4));
+  EXPECT_FALSE(degenerate.is_edge);
+  EXPECT_TRUE(degenerate.is_verified);
+  const ReplayedPair& too_few = graph.pairs.at(ImagePair(2, 4));
+  EXPECT_FALSE(too_few.is_edge);
+  EXPECT_FALSE(too_few.is_verified);
+  EXPECT_EQ(graph.num_edges, 1U);
+  EXPECT_EQ(graph.num_skipped, 1U);
+  EXPECT_EQ(graph.first_skipped, "a.jpg\tnone.jpg");
+}
+
+TEST_F(FinishedGraphTest, ConfigurationAndMatchesMayBeLeftOut) {
+  const FinishedGraph graph = Read("a.jpg\tc.jpg\t15\n");
+  EXPECT_TRUE(graph.pairs.at(ImagePair(1, 4)).is_edge);
+  EXPECT_TRUE(graph.pairs.at(ImagePair(1, 4)).is_verified);
+}
+
+TEST_F(FinishedGraphTest, WhatIsNoList) {
+  EXPECT_THAT([&] { Read("a.jpg\tc.jpg\t15\na.jpg c.jpg 15\n"); },
+              ThrowsMessage<FileError>(HasSubstr("Line 2 of " + path_.string())));
+  EXPECT_THAT([&] { Read("a.jpg\tc.jpg\t15\na.jpg\tc.jpg\t-3\n"); },
+              ThrowsMessage<FileError>(HasSubstr("Line 2")));
+  EXPECT_THAT([&] { Read("x.jpg\ty.jpg\t15\n"); },
+              ThrowsMessage<FileError>(HasSubstr("the first pair is \"x.jpg\ty.jpg\"")));
+  EXPECT_THAT([&] { Read("a.jpg\tc.jpg\t14\n"); },
+              ThrowsMessage<FileError>(HasSubstr("Has it been matched?")));
+  EXPECT_THROW(ReadFinishedGraph(directory_.Path() / "none", images_, 15, 1), FileError);
+}
+
+TEST_F(FinishedGraphTest, ADatabaseWhoseImagesHaveOtherIds) {
+  const std::filesystem::path path = directory_.Path() / "matched.db";
+  Descriptors descriptors;
+  descriptors.num_rows = 30;
+  descriptors.data.resize(30 * kDescriptorDim, 1);
+  WriteSyntheticDatabase(
+      path, Schema::kColmap38,
+      {{"c.jpg", descriptors, {}}, {"a.jpg", descriptors, {}}, {"b b.jpg", descriptors, {}}});
+  {
+    Database database(path, sqlite::Access::kReadWrite, 1);
+    PairRows edge;
+    edge.pair = ImagePair(1, 2);
+    edge.num_matches = edge.num_inliers = 20;
+    edge.matches = edge.inliers = sqlite::Blob(20 * 8);
+    edge.config = 3;
+    PairRows none;
+    none.pair = ImagePair(2, 3);
+    none.num_matches = 17;
+    none.matches = sqlite::Blob(17 * 8);
+    none.config = 1;
+    database.WritePairs({edge, none});
+  }
+  const FinishedGraph graph = ReadFinishedGraph(path, images_, 15, 1);
+  ASSERT_THAT(graph.pairs, SizeIs(2));
+  EXPECT_TRUE(graph.pairs.at(ImagePair(1, 4)).is_edge);
+  EXPECT_FALSE(graph.pairs.at(ImagePair(1, 2)).is_edge);
+  EXPECT_TRUE(graph.pairs.at(ImagePair(1, 2)).is_verified);
+}
+
+class RankedListsTest : public TextFileTest {
+ protected:
+  RankedLists Read(const std::string& text) {
+    return ReadRankedLists(Write(text), WithFeatures(images_));
+  }
+};
+
+TEST_F(RankedListsTest, GreaterScoresAreNearer) {
+  const RankedLists lists =
+      Read("a.jpg\tc.jpg\t0.25\na.jpg\tb b.jpg\t0.5\nc.jpg\tnone.jpg\t1\nc.jpg\tc.jpg\t1\n");
+  EXPECT_THAT(lists.ranking->NearestOf(0), ElementsAre(1, 2));
+  EXPECT_THAT(lists.ranking->AllOf(0), ElementsAre(1, 2));
+  EXPECT_THAT(lists.ranking->NearestOf(2), IsEmpty());
+  EXPECT_EQ(lists.ranking->Distance(2, 0), -0.25F);
+  EXPECT_GT(lists.ranking->Distance(1, 2), 1e30F);
+  EXPECT_EQ(lists.num_skipped, 1U);
+  EXPECT_EQ(lists.first_skipped, "c.jpg\tnone.jpg\t1");
+}
+
+TEST_F(RankedListsTest, WhatIsNoList) {
+  for (const char* line : {"a.jpg\tc.jpg\n", "a.jpg\tc.jpg\tnear\n", "a.jpg\tc.jpg\tnan\n",
+                           "a.jpg c.jpg 0.5\n", "a.jpg\tc.jpg\t1\t2\n"}) {
+    EXPECT_THAT([&] { Read(std::string("a.jpg\tc.jpg\t1\n") + line); },
+                ThrowsMessage<FileError>(HasSubstr("Line 2 of " + path_.string())));
+  }
+  EXPECT_THROW(Read("x\ty\t1\n"), FileError);
+}
+
+class Silence : public PipelineObserver {
+ public:
+  void OnInfo(const std::string& /*message*/) override {}
+  void OnWarning(const std::string& message) override { warnings.push_back(message); }
+  void OnProgress(const LoopProgress& /*progress*/) override {}
+  std::vector<std::string> warnings;
+};
+
+class ReplayTest : public ::testing::Test {
+ protected:
+  // 6 places of 5 photos each; the photos of a place are edges.
+  ReplayTest() {
+    std::vector<SyntheticImage> images = MakePlaces(6, 5, 40, 1);
+    std::ofstream truth(options_.replay_path = directory_.Path() / "truth.tsv");
+    images[3].name = "with \"quotes\", and a comma";
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      for (std::size_t j = i + 1; j < images.size() && j / 5 == i / 5; ++j) {
+        truth << images[i].name << '\t' << images[j].name << "\t" << 20 + i << "\n";
+      }
+    }
+    options_.database_path = directory_.Path() / "database.db";
+    WriteSyntheticDatabase(options_.database_path, Schema::kColmap38, images);
+    options_.num_threads = 1;
+    options_.ranking.vectors.gmm.num_components = 4;
+    options_.colmap_path = "/nowhere/colmap";
+  }
+
+  PipelineResult Run() {
+    StopRequest stop;
+    return RunPipeline(options_, stop, observer_);
+  }
+
+  TestDirectory directory_;
+  PipelineOptions options_;
+  Silence observer_;
+};
+
+TEST_F(ReplayTest, FindsTheEdgesAndLeavesTheDatabaseAlone) {
+  const std::string before = ReadFile(options_.database_path);
+  const PipelineResult result = Run();
+  EXPECT_EQ(result.matching.graph.NumEdges(), 60U);
+  EXPECT_EQ(result.matching.num_components, 6U);
+  EXPECT_TRUE(result.replayed);
+  EXPECT_TRUE(before == ReadFile(options_.database_path));
+  EXPECT_THAT(observer_.warnings, IsEmpty());
+}
+
+TEST_F(ReplayTest, CostsAreThoseOfTheTestedPairs) {
+  options_.strategy = PipelineOptions::Strategy::kExhaustive;
+  options_.replay_costs = {1000, 2};
+  // 435 pairs of 40 x 40 products, 60 of them verified.
+  EXPECT_NEAR(Run().modelled_seconds, 435 * 1.6 + 60 * 2, 1e-6);
+  options_.num_threads = 2;
+  EXPECT_NEAR(Run().modelled_seconds, (435 * 1.6 + 60 * 2) / 2, 1e-6);
+}
+
+TEST_F(ReplayTest, TheLogHasEveryTest) {
+  options_.test_log_path = directory_.Path() / "log.csv";
+  const PipelineResult result = Run();
+  std::istringstream log(ReadFile(options_.test_log_path));
+  std::string line;
+  std::getline(log, line);
+  EXPECT_EQ(line, "test,seconds,stage,iteration,image1,image2,inliers,edge");
+  std::size_t num_tests = 0;
+  std::size_t num_edges = 0;
+  double last_seconds = result.preprocessing_seconds.Sum();
+  bool quoted = false;
+  while (std::getline(log, line)) {
+    ++num_tests;
+    EXPECT_EQ(line.rfind(std::to_string(num_tests) + ",", 0), 0U) << line;
+    const double seconds = std::stod(line.substr(line.find(',') + 1));
+    EXPECT_GE(seconds, last_seconds - 1e-4);
+    last_seconds = seconds;
+    num_edges += line.back() == '1' ? 1 : 0;
+    quoted = quoted || line.find(",\"with \"\"quotes\"\", and a comma\",") != std::string::npos;
+  }
+  EXPECT_EQ(num_tests, result.matching.All().num_tested);
+  EXPECT_EQ(num_edges, 60U);
+  EXPECT_TRUE(quoted);
+  options_.test_log_path = directory_.Path() / "none" / "log.csv";
+  EXPECT_THROW(Run(), FileError);
+}
+
+TEST_F(ReplayTest, TheReportSaysWhatWasFound) {
+  const PipelineResult result = Run();
+  const std::filesystem::path path = directory_.Path() / "report.json";
+  WriteJsonReport(path, options_, result);
+  const nlohmann::json report = nlohmann::json::parse(ReadFile(path));
+  EXPECT_EQ(report["schema"], "graphmatch-report");
+  EXPECT_EQ(report["version"], 1);
+  EXPECT_EQ(report["strategy"], "graphmatch");
+  EXPECT_EQ(report["graph"]["edges"], 60);
+  EXPECT_EQ(report["images"]["total"], 30);
+  std::size_t num_tests = 0;
+  for (const auto& iteration : report["iterations"]) {
+    num_tests += iteration["sampling"]["tested"].get<std::size_t>() +
+                 iteration["propagation"]["tested"].get<std::size_t>();
+  }
+  EXPECT_EQ(num_tests, result.matching.graph.NumTested());
+  EXPECT_THROW(WriteJsonReport(directory_.Path() / "none" / "report.json", options_, result),
+               FileError);
+}
+
+TEST_F(ReplayTest, RankedListsTakeThePlaceOfVectors) {
+  options_.ranking.ranking_path = directory_.Path() / "lists.tsv";
+  std::ofstream(options_.ranking.ranking_path) << "image_0_0.jpg\tno such image\t1\n";
+  EXPECT_THROW(Run(), FileError);
+  Database database(options_.database_path, sqlite::Access::kRead, 1);
+  const std::vector<ImageRecord> images = database.ReadImages();
+  std::ofstream(options_.ranking.ranking_path)
+      << images[0].name << '\t' << images[1].name << "\t0.5\n"
+      << images[7].name << '\t' << images[1].name << "\t0.25\n";
+  options_.strategy = PipelineOptions::Strategy::kRetrieval;
+  const PipelineResult result = Run();
+  EXPECT_EQ(result.matching.graph.NumTested(), 2U);
+  EXPECT_EQ(result.matching.graph.NumEdges(), 1U);
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch
