@@ -81,7 +81,7 @@ TEST(FisherVectorTest, IsThatOfTheReferenceForSiftDescriptors) {
   Random random({33});
   const RowMatrixXf samples = SampleSiftLike(2000, &random);
   const GaussianMixture mixture = SiftMixture(samples);
-  ASSERT_EQ(mixture.NumComponents(), 16);
+  ASSERT_EQ(mixture.NumComponents(), 64);
   ExpectGradientOfTheReference(mixture, samples.topRows(700));
   ExpectGradientOfTheReference(mixture, SampleSiftLike(700, &random));
   ExpectGradientOfTheReference(mixture, samples.topRows(1));

@@ -596,7 +596,7 @@ TEST_F(EmptyComponentTest, TheLikelihoodFallsAtMostOnceForEveryReplacedComponent
 
 TEST(GmmOptionsTest, DefaultsAreValid) {
   EXPECT_NO_THROW(GmmOptions().Check());
-  EXPECT_EQ(GmmOptions().num_components, 16);
+  EXPECT_EQ(GmmOptions().num_components, 64);
 }
 
 TEST(GmmOptionsTest, InvalidOptionsAreRefused) {

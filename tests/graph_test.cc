@@ -324,11 +324,24 @@ std::vector<NamedOptions> AllChoices() {
     o.num_to_propagate = 1;
   });
   add("DropTestedLate", [](O& o) { o.propagate_untested_only = false; });
+  add("GoOnInTheList", [](O& o) { o.sample_untested_only = false; });
+  add("GoOnInTheListCountingIncomingTests", [](O& o) {
+    o.sample_untested_only = false;
+    o.count_incoming_tests = true;
+  });
   add("NewEdgesOnly", [](O& o) {
     o.propagate_from_new_edges_only = true;
     o.num_to_propagate = 1;
   });
   add("StopSampling", [](O& o) { o.stop_sampling_without_edges = true; });
+  add("FailedSamples", [](O& o) {
+    o.max_failed_samples = 2;
+    o.max_tests_for_sampling = 20;
+  });
+  add("FailedSamplesInList", [](O& o) {
+    o.max_failed_samples = 3;
+    o.sample_untested_only = false;
+  });
   add("FewNeighbors", [](O& o) { o.max_num_neighbors = 3; });
   add("NoSampling", [](O& o) { o.number_sample_iterations = 0; });
   add("NoPropagation", [](O& o) { o.num_to_propagate = 0; });
@@ -454,6 +467,55 @@ TEST(Loop, TerminatesWithoutAnyEdge) {
   EXPECT_EQ(result.graph.NumEdges(), 0U);
   EXPECT_EQ(result.num_isolated, 40U);
   EXPECT_EQ(result.iterations.size(), 10U);
+}
+
+// Lists and budgets end long before the iterations do.
+TEST(Loop, ManyIterationsWithNothingToSampleAreSkipped) {
+  const Scene scene = MakeScene(4, 10, 4, 0.5, 4);
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  GraphMatchOptions options;
+  options.number_sample_iterations = 1000000000;
+  for (const int budget : {10, 1000000000}) {
+    options.max_tests_for_sampling = budget;
+    options.sample_untested_only = false;
+    options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kFloor;
+    RecordingVerifier in_list(edges);
+    const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &in_list);
+    EXPECT_LE(result.iterations.size(), 40U);
+    EXPECT_EQ(result.graph.NumTested(), in_list.tested.size());
+  }
+  options.number_sample_iterations = 1000000;
+  options.max_tests_for_sampling = 5;
+  options.sample_untested_only = true;
+  options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kCarry;
+  RecordingVerifier carried(edges);
+  const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &carried);
+  // One draw of each in every 200,000th iteration, the fifth in the last one.
+  int last = 0;
+  for (const IterationStatistics& iteration : result.iterations) last = iteration.iteration;
+  EXPECT_GE(last, 999999);
+  EXPECT_LE(result.iterations.size(), 50U);
+}
+
+TEST(Loop, GivesUpSamplingOfAnImageThatHasANeighbour) {
+  // Places of two: an image's second draw and all later ones are in vain.
+  const Scene scene = MakeScene(20, 2, 1, 0.25, 7);
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  const VectorRanking ranking = MakeRanking(scene);
+  GraphMatchOptions options;
+  options.num_to_propagate = 0;
+  RecordingVerifier all(edges);
+  const GraphMatchResult spent = RunLoop(options, ranking, &all);
+  options.max_failed_samples = 2;
+  RecordingVerifier some(edges);
+  const GraphMatchResult saved = RunLoop(options, ranking, &some);
+  EXPECT_EQ(spent.graph.NumEdges(), 20U);
+  EXPECT_EQ(saved.graph.NumEdges(), 20U);
+  EXPECT_LE(saved.graph.NumTested(), 20U + 40U * 2U);
+  EXPECT_GT(spent.graph.NumTested(), 2 * saved.graph.NumTested());
+  // Those without a neighbour go on.
+  RecordingVerifier none({});
+  EXPECT_EQ(RunLoop(options, ranking, &none).iterations.size(), 10U);
 }
 
 TEST(Loop, HandlesNoneOneAndTwoImages) {

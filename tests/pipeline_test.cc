@@ -105,6 +105,48 @@ TEST(PipelineOptions, AListAndAnotherStrategyContradictEachOther) {
   EXPECT_THROW(options.Check(), OptionsError);
 }
 
+TEST(PipelineOptions, OptionsThatWouldHaveNoEffect) {
+  const auto is_refused = [](const auto& set) {
+    PipelineOptions options;
+    set(options);
+    try {
+      options.Check();
+    } catch (const OptionsError&) {
+      return true;
+    }
+    return false;
+  };
+  using Strategy = PipelineOptions::Strategy;
+  EXPECT_FALSE(is_refused([](PipelineOptions& o) { o.ranking.export_path = "v.npy"; }));
+  EXPECT_TRUE(is_refused([](PipelineOptions& o) { o.ranking.export_path = "v.txt"; }));
+  EXPECT_TRUE(is_refused([](PipelineOptions& o) {
+    o.ranking.export_path = "v.npy";
+    o.strategy = Strategy::kExhaustive;
+  }));
+  EXPECT_TRUE(is_refused([](PipelineOptions& o) {
+    o.ranking.ranking_path = "lists.tsv";
+    o.match_list_path = "pairs.txt";
+  }));
+  EXPECT_TRUE(is_refused([](PipelineOptions& o) {
+    o.ranking.ranking_path = "lists.tsv";
+    o.ranking.vectors.descriptor = ImageVectorOptions::Descriptor::kVlad;
+  }));
+}
+
+TEST(RunState, OneOfNothingKeepsNothing) {
+  RunState state;
+  state.Select(ImageVectorOptions(), {{1, 11}}, "");
+  state.KeepModel(VectorModel());
+  const float entry = 1;
+  state.KeepVectors({0}, 1, &entry);
+  state.KeepSeeds("key", {ImagePair(1, 2)});
+  float read = 0;
+  EXPECT_FALSE(state.ReadModel().has_value());
+  EXPECT_EQ(state.ReadVectors(1, &read), std::vector<bool>{false});
+  EXPECT_TRUE(state.ReadSeeds("key").empty());
+  EXPECT_TRUE(state.FindChanged().empty());
+}
+
 class RunStateTest : public ::testing::Test {
  protected:
   RunState Open(double lock_timeout = 1) {
@@ -112,7 +154,8 @@ class RunStateTest : public ::testing::Test {
     RunState state(database_, lock_timeout, stop_, warn, warn);
     ImageVectorOptions options;
     options.gmm.num_components = 2;
-    state.Select(options, {{1, 11}, {2, 22}, {3, 33}});
+    options.pca_dim = pca_dim_;
+    state.Select(options, {{1, 11}, {2, 22}, {3, 33}}, "");
     return state;
   }
 
@@ -124,34 +167,57 @@ class RunStateTest : public ::testing::Test {
     return mixture;
   }
 
+  static VectorModel Model(const GaussianMixture& mixture) { return {Pca(), mixture}; }
+
   // What the next run finds of a mixture that was kept with two vectors of three.
   bool IsFound(const GaussianMixture& mixture) {
     {
       RunState state = Open();
-      state.KeepMixture(mixture);
+      state.KeepModel(Model(mixture));
       state.KeepVectors({0, 2}, 4, std::vector<float>(8, 1).data());
     }
-    return Open().ReadMixture().has_value();
+    return Open().ReadModel().has_value();
   }
 
   TestDirectory directory_;
   std::filesystem::path database_ = directory_.Path() / "database.db";
   StopRequest stop_;
   std::vector<std::string> warnings_;
+  int pca_dim_ = 0;
 };
+
+TEST_F(RunStateTest, APcaIsKeptWithTheMixture) {
+  pca_dim_ = 3;
+  VectorModel model = Model(Mixture(2, 3));
+  EXPECT_FALSE(IsFound(model.mixture));  // Without the PCA it is of no use.
+  model.pca.mean = Eigen::VectorXd::Constant(kDescriptorDim, 0.25);
+  model.pca.basis = RowMatrixXd::Identity(3, kDescriptorDim);
+  {
+    RunState state = Open();
+    state.KeepModel(model);
+    state.KeepVectors({0, 2}, 4, std::vector<float>(8, 1).data());
+  }
+  const std::optional<VectorModel> found = Open().ReadModel();
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->pca.mean, model.pca.mean);
+  EXPECT_EQ(found->pca.basis, model.pca.basis);
+  EXPECT_EQ(found->mixture.variances, model.mixture.variances);
+  pca_dim_ = 4;
+  EXPECT_FALSE(Open().ReadModel().has_value());
+}
 
 TEST_F(RunStateTest, AMixtureIsKeptWhileHalfOfTheImagesHaveAVector) {
   const GaussianMixture mixture = Mixture(2, kDescriptorDim);
   EXPECT_TRUE(IsFound(mixture));
   {
     RunState state = Open();
-    EXPECT_EQ(state.ReadMixture()->means, mixture.means);
+    EXPECT_EQ(state.ReadModel()->mixture.means, mixture.means);
     std::vector<float> vectors(12);
     EXPECT_THAT(state.ReadVectors(4, vectors.data()), ElementsAre(true, false, true));
-    state.KeepMixture(mixture);
+    state.KeepModel(Model(mixture));
     state.KeepVectors({1}, 4, vectors.data());
   }
-  EXPECT_FALSE(Open().ReadMixture().has_value());
+  EXPECT_FALSE(Open().ReadModel().has_value());
   EXPECT_THAT(warnings_, IsEmpty());
 }
 
@@ -165,7 +231,7 @@ TEST_F(RunStateTest, WhatCannotBeAMixtureIsNotTakenForOne) {
     EXPECT_FALSE(IsFound(mixture)) << value;
   }
   // As large as no machine's memory.
-  const std::int64_t shape[] = {std::int64_t{1} << 20, std::int64_t{1} << 20};
+  const std::int64_t shape[] = {std::int64_t{1} << 20, std::int64_t{1} << 20, 0};
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(shape);
   sqlite::Connection connection(StateFile::PathFor(database_), sqlite::Access::kReadWrite, 1);
   sqlite::Statement update(connection, "UPDATE mixture SET data = ?1, checksum = ?2");
@@ -173,7 +239,7 @@ TEST_F(RunStateTest, WhatCannotBeAMixtureIsNotTakenForOne) {
   crc.process_bytes(shape, sizeof(shape));
   const sqlite::Blob blob(bytes, bytes + sizeof(shape));
   update.Bind(1, blob).Bind(2, std::int64_t{crc.checksum()}).Run();
-  EXPECT_FALSE(Open().ReadMixture().has_value());
+  EXPECT_FALSE(Open().ReadModel().has_value());
 }
 
 TEST_F(RunStateTest, SeedsBelongToALoop) {

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/encoding/numpy_file.h"
 #include "colmap_graphmatch/pipeline/finished_graph.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/pipeline/ranked_lists.h"
@@ -82,6 +84,8 @@ TEST_F(FinishedGraphTest, WhatIsNoList) {
               ThrowsMessage<FileError>(HasSubstr("Line 2 of " + path_.string())));
   EXPECT_THAT([&] { Read("a.jpg\tc.jpg\t15\na.jpg\tc.jpg\t-3\n"); },
               ThrowsMessage<FileError>(HasSubstr("Line 2")));
+  EXPECT_THAT([&] { Read("a.jpg\tc.jpg\t15\na.jpg\tc.jpg\t4294967311\n"); },
+              ThrowsMessage<FileError>(HasSubstr("Line 2")));
   EXPECT_THAT([&] { Read("x.jpg\ty.jpg\t15\n"); },
               ThrowsMessage<FileError>(HasSubstr("the first pair is \"x.jpg\ty.jpg\"")));
   EXPECT_THAT([&] { Read("a.jpg\tc.jpg\t14\n"); },
@@ -116,6 +120,13 @@ TEST_F(FinishedGraphTest, ADatabaseWhoseImagesHaveOtherIds) {
   EXPECT_TRUE(graph.pairs.at(ImagePair(1, 4)).is_edge);
   EXPECT_FALSE(graph.pairs.at(ImagePair(1, 2)).is_edge);
   EXPECT_TRUE(graph.pairs.at(ImagePair(1, 2)).is_verified);
+}
+
+TEST_F(FinishedGraphTest, OfAPairThatIsThereTwiceTheLastLineCounts) {
+  const FinishedGraph graph =
+      Read("a.jpg\tc.jpg\t20\nc.jpg\ta.jpg\t3\na.jpg\tb b.jpg\t5\nb b.jpg\ta.jpg\t30\n");
+  EXPECT_EQ(graph.num_edges, 1U);
+  EXPECT_FALSE(graph.pairs.at(ImagePair(1, 4)).is_edge);
 }
 
 class RankedListsTest : public TextFileTest {
@@ -190,7 +201,39 @@ TEST_F(ReplayTest, FindsTheEdgesAndLeavesTheDatabaseAlone) {
   EXPECT_EQ(result.matching.num_components, 6U);
   EXPECT_TRUE(result.replayed);
   EXPECT_TRUE(before == ReadFile(options_.database_path));
+  // Nor does it touch what a run on these photos keeps for the next one.
+  EXPECT_FALSE(std::filesystem::exists(options_.database_path.string() + ".graphmatch"));
   EXPECT_THAT(observer_.warnings, IsEmpty());
+}
+
+TEST_F(ReplayTest, EndsWhenItIsAskedTo) {
+  StopRequest stop;
+  class Stopper : public Silence {
+   public:
+    explicit Stopper(StopRequest* stop) : stop_(stop) {}
+    void OnProgress(const LoopProgress& progress) override {
+      if (progress.all.num_tested == 7) stop_->Raise();
+    }
+
+   private:
+    StopRequest* stop_;
+  };
+  Stopper stopper(&stop);
+  const PipelineResult result = RunPipeline(options_, stop, stopper);
+  EXPECT_FALSE(result.matching.finished);
+  EXPECT_EQ(result.matching.graph.NumTested(), 7U);
+}
+
+TEST_F(ReplayTest, AVectorOfZerosIsNoError) {
+  options_.ranking.export_path = directory_.Path() / "vectors.npy";
+  Run();
+  NamedVectors vectors = ReadNamedVectors(options_.ranking.export_path);
+  std::fill_n(vectors.rows.begin(), vectors.dim, 0.0F);
+  WriteNamedVectors(options_.ranking.export_path, vectors);
+  options_.ranking.vectors.vectors_path = options_.ranking.export_path;
+  options_.ranking.vectors.descriptor = ImageVectorOptions::Descriptor::kFile;
+  options_.ranking.export_path.clear();
+  EXPECT_GE(Run().matching.graph.NumEdges(), 56U);
 }
 
 TEST_F(ReplayTest, CostsAreThoseOfTheTestedPairs) {
@@ -239,8 +282,12 @@ TEST_F(ReplayTest, TheReportSaysWhatWasFound) {
   EXPECT_EQ(report["strategy"], "graphmatch");
   EXPECT_EQ(report["graph"]["edges"], 60);
   EXPECT_EQ(report["images"]["total"], 30);
+  EXPECT_GT(report["peak_memory_mb"], 1);
+  EXPECT_LT(report["peak_memory_mb"], 10000);
   std::size_t num_tests = 0;
+  int number = 0;
   for (const auto& iteration : report["iterations"]) {
+    EXPECT_EQ(iteration["iteration"], number++);
     num_tests += iteration["sampling"]["tested"].get<std::size_t>() +
                  iteration["propagation"]["tested"].get<std::size_t>();
   }

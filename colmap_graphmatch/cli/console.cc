@@ -150,7 +150,7 @@ std::string FormatProgress(const LoopProgress& progress, double seconds_of_match
   return line;
 }
 
-std::string FormatSummary(const PipelineResult& result) {
+std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result) {
   const GraphMatchResult& matching = result.matching;
   const auto num_images =
       static_cast<double>(result.num_images - result.num_images_without_features);
@@ -198,10 +198,14 @@ std::string FormatSummary(const PipelineResult& result) {
   }
   text += fmt::format("Time               {}", FormatDuration(result.total_seconds));
   if (!listed) {
-    text += fmt::format(" (mixture {}, Fisher vectors {}, ranking {}, matching {})",
-                        FormatDuration(result.preprocessing_seconds.mixture),
-                        FormatDuration(result.preprocessing_seconds.vectors),
-                        FormatDuration(result.preprocessing_seconds.ranking),
+    const ImageRankingSeconds& seconds = result.preprocessing_seconds;
+    text += " (";
+    if (seconds.mixture > 0) text += fmt::format("mixture {}, ", FormatDuration(seconds.mixture));
+    if (options.ranking.ranking_path.empty()) {
+      text += fmt::format("{} {}, ", NameOfVectors(options.ranking.vectors.descriptor),
+                          FormatDuration(seconds.vectors));
+    }
+    text += fmt::format("ranking {}, matching {})", FormatDuration(seconds.ranking),
                         FormatDuration(result.matching_seconds));
   }
   text += '\n';

@@ -48,6 +48,6 @@ std::string FormatDuration(double seconds);
 std::string FormatProgress(const LoopProgress& progress, double seconds_of_matching);
 
 // What the run found and what it cost.
-std::string FormatSummary(const PipelineResult& result);
+std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result);
 
 }  // namespace colmap_graphmatch

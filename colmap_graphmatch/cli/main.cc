@@ -11,6 +11,7 @@
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/version.h"
+#include "colmap_graphmatch/base/whole_file.h"
 #include "colmap_graphmatch/cli/console.h"
 #include "colmap_graphmatch/cli/exit_codes.h"
 #include "colmap_graphmatch/cli/options.h"
@@ -60,18 +61,20 @@ int Run(const CommandLine& line) {
   for (const std::string& message : line.unused_options) console.OnInfo(message);
   for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
+    if (!line.report_path.empty()) CheckCanWrite(line.report_path);
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
     console.ClearProgress();
-    if (!line.report_path.empty()) WriteJsonReport(line.report_path, line.pipeline, result);
-    std::cout << FormatSummary(result) << std::flush;
+    std::cout << FormatSummary(line.pipeline, result) << std::flush;
     WarnIfNotWritten(std::cout);
+    if (!line.report_path.empty()) WriteJsonReport(line.report_path, line.pipeline, result);
     if (result.matching.finished) return kExitSuccess;
   } catch (const StoppedError&) {
     // Before the first pair: there is nothing to sum up.
   }
-  console.OnInfo(
-      "Stopped as asked. Everything verified so far is in the database; run the same command again "
-      "to go on from here.");
+  console.OnInfo(line.pipeline.replay_path.empty()
+                     ? "Stopped as asked. Everything verified so far is in the database; run the "
+                       "same command again to go on from here."
+                     : "Stopped as asked.");
   return kExitInterrupted;
 }
 

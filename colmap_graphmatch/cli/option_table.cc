@@ -41,6 +41,11 @@ const Names<ColmapVerifierOptions::Matcher> kMatchers = {
     {"auto", ColmapVerifierOptions::Matcher::kAuto},
     {"exact", ColmapVerifierOptions::Matcher::kExact},
     {"colmap", ColmapVerifierOptions::Matcher::kColmap}};
+const Names<ImageVectorOptions::Descriptor> kDescriptors = {
+    {"fisher", ImageVectorOptions::Descriptor::kFisher},
+    {"vlad", ImageVectorOptions::Descriptor::kVlad},
+    {"gist", ImageVectorOptions::Descriptor::kGist},
+    {"file", ImageVectorOptions::Descriptor::kFile}};
 const Names<ImageVectorOptions::FeatureSelection> kSelections = {
     {"largest", ImageVectorOptions::FeatureSelection::kLargestScales},
     {"random", ImageVectorOptions::FeatureSelection::kRandom}};
@@ -344,6 +349,8 @@ void Table::AddGraph() {
       "rounds (>= 0) of query expansion by briad");
   Add("GraphMatching.sampling_schedule", OneOf(&p.graph.sampling_schedule, kSchedules),
       "tests an iteration: budget / iterations as floor, round, or carry (spends it all)");
+  Add("GraphMatching.sample_untested_only", BoolOf(&p.graph.sample_untested_only),
+      "draw the nearest untested images; 0: go on in the ranked list, and drop the tested");
   Add("GraphMatching.count_incoming_tests", BoolOf(&p.graph.count_incoming_tests),
       "tests drawn by other images count against an image's budget, too");
   Add("GraphMatching.propagation_distance", OneOf(&p.graph.propagation_distance, kDistances),
@@ -355,12 +362,27 @@ void Table::AddGraph() {
       "propagate along each edge only once");
   Add("GraphMatching.stop_sampling_without_edges", BoolOf(&p.graph.stop_sampling_without_edges),
       "end sampling after an iteration that found no edge");
+  Add("GraphMatching.max_failed_samples", IntOf(&p.graph.max_failed_samples, 0),
+      "draws (>= 0) of an image in a row that were no edges, after which it draws no more if it "
+      "has a neighbour; 0: it spends its whole budget. 3 saves tests and loses few edges");
 }
 
 void Table::AddVectors() {
   ImageRankingOptions& ranking = line_->pipeline.ranking;
   ImageVectorOptions& vectors = ranking.vectors;
   Section("GraphMatch: how images are described");
+  Add("GraphMatching.descriptor", OneOf(&vectors.descriptor, kDescriptors),
+      "what describes an image: Fisher vectors of its features; for comparison VLAD of them, GIST "
+      "of the photo, or vectors of another program from a file");
+  Add("image_path", TextOf(&vectors.image_path, "the path of a directory"),
+      "the directory of the photos; needed for the descriptor gist alone");
+  Add("GraphMatching.vectors_path", TextOf(&vectors.vectors_path, "the path of a .npy file"),
+      "for the descriptor file: a NumPy array, a row of float32 or float64 for each image; the "
+      "images' names are in the file of the same name with .txt instead of .npy, one a line");
+  Add("GraphMatching.export_vectors", TextOf(&ranking.export_path, "the path of a .npy file"),
+      "write the vectors that were made to such files");
+  Add("GraphMatching.pca_dim", IntOf(&vectors.pca_dim, 0),
+      "dimensions (1 to 128) that the features are reduced to before the mixture; 0: not reduced");
   Add("GraphMatching.num_components", IntOf(&vectors.gmm.num_components, 1),
       "Gaussians (>= 1) of the mixture; time and memory grow in proportion");
   Add("GraphMatching.max_num_features", IntOf(&vectors.max_num_features, 1),

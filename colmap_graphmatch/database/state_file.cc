@@ -16,7 +16,7 @@ namespace {
 constexpr std::int64_t kApplicationId = 0x474D7374;
 
 // Of the layout of the tables and of the meaning of what is in them.
-constexpr std::int64_t kFormatVersion = 1;
+constexpr std::int64_t kFormatVersion = 2;
 
 std::int64_t Checksum(const void* data, std::size_t size) {
   boost::crc_32_type crc;

@@ -23,8 +23,8 @@ struct GaussianMixture {
 
 struct GmmOptions {
   // K. More components describe finer differences and cost proportionally more time and memory: the
-  // Fisher vector of an image has 2 K D entries. Paper: 16 ("We used 16 centroids").
-  int num_components = 16;
+  // Fisher vector of an image has 2 K D entries. Paper: 16 ("We used 16 centroids") of D = 128.
+  int num_components = 64;
 
   // EM stops when the log-likelihood grows by less than this fraction of itself, or after
   // max_num_iterations.

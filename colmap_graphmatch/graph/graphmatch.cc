@@ -29,14 +29,12 @@ class Loop {
   // add_known_at_the_end: what is known and was not asked for may still lead on.
   GraphMatchResult Run(bool add_known_at_the_end) {
     for (iteration_ = 0; builder_.Continues(); ++iteration_) {
-      iterations_.emplace_back();
+      iterations_.push_back({iteration_, {}, {}});
       const bool sampled = Sample();
       const bool propagated = builder_.Continues() && Propagate();
       if (sampled || propagated) continue;
       iterations_.pop_back();
-      if (!sampling_over_ && options_.MoreTestsAfterEmpty(iteration_, ranking_.NumVertices())) {
-        continue;
-      }
+      if (GoesOnAfterEmpty()) continue;
       if (!add_known_at_the_end || !builder_.AddKnown()) break;
       sampler_.ChargeTested(builder_.Graph());
     }
@@ -68,6 +66,17 @@ class Loop {
     iterations_.back().propagation =
         builder_.Verify(LoopStage::kPropagation, iteration_, pairs, ExpectedTestsAfterThisBatch());
     return !pairs.empty();
+  }
+
+  // After an iteration without a test: moves on to before the next one that may have some.
+  bool GoesOnAfterEmpty() {
+    const std::size_t num_vertices = ranking_.NumVertices();
+    const int next = options_.NextSamplingAfterEmpty(iteration_, num_vertices);
+    const bool lists_are_over =
+        options_.TestsInIteration(iteration_, num_vertices) > 0 && !sampler_.HasAdvanced();
+    if (sampling_over_ || lists_are_over || next >= options_.number_sample_iterations) return false;
+    iteration_ = next - 1;
+    return true;
   }
 
   // As many in each iteration to come as in the last whole one. They shrink, so this is rather too

@@ -34,6 +34,7 @@ struct StageStatistics {
 StageStatistics operator+(const StageStatistics& a, const StageStatistics& b);
 
 struct IterationStatistics {
+  int iteration = 0;  // Counted from 0; those without a test are left out.
   StageStatistics sampling;
   StageStatistics propagation;
 };

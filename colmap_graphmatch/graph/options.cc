@@ -38,12 +38,13 @@ int GraphMatchOptions::TestsInIteration(int iteration, std::size_t num_images) c
   return std::max(1, budget / iterations);
 }
 
-bool GraphMatchOptions::MoreTestsAfterEmpty(int iteration, std::size_t num_images) const {
-  if (TestsInIteration(iteration, num_images) > 0) return false;
-  for (int later = iteration + 1; later < number_sample_iterations; ++later) {
-    if (TestsInIteration(later, num_images) > 0) return true;
+int GraphMatchOptions::NextSamplingAfterEmpty(int iteration, std::size_t num_images) const {
+  if (sample_untested_only && TestsInIteration(iteration, num_images) > 0) {
+    return number_sample_iterations;
   }
-  return false;
+  int next = iteration + 1;
+  while (next < number_sample_iterations && TestsInIteration(next, num_images) == 0) ++next;
+  return next;
 }
 
 void GraphMatchOptions::Check() const {
@@ -51,6 +52,7 @@ void GraphMatchOptions::Check() const {
   CheckAtLeast("max_num_neighbors", max_num_neighbors, 1);
   CheckAtLeast("num_to_propagate", num_to_propagate, 0);
   CheckAtLeast("max_tests_for_sampling", max_tests_for_sampling, 0);
+  CheckAtLeast("max_failed_samples", max_failed_samples, 0);
 }
 
 }  // namespace colmap_graphmatch

@@ -9,8 +9,20 @@ Sampler::Sampler(const GraphMatchOptions& options, const Ranking& ranking, Threa
       ranking_(ranking),
       threads_(threads),
       cursors_(ranking.NumVertices()),
+      num_places_(ranking.NumVertices()),
       num_drawn_(ranking.NumVertices()),
+      num_failed_(ranking.NumVertices()),
       drawn_(ranking.NumVertices()) {}
+
+bool Sampler::GivesUp(Vertex vertex, const MatchingGraph& graph) {
+  const std::vector<Vertex>& neighbors = graph.Neighbors(vertex);
+  for (const Vertex other : drawn_[vertex]) {
+    const bool is_edge = std::binary_search(neighbors.begin(), neighbors.end(), other);
+    num_failed_[vertex] = is_edge ? 0 : num_failed_[vertex] + 1;
+  }
+  return options_.max_failed_samples > 0 && !neighbors.empty() &&
+         num_failed_[vertex] >= options_.max_failed_samples;
+}
 
 std::vector<Vertex> Sampler::NextUntested(Vertex vertex, std::size_t num,
                                           const MatchingGraph& graph) {
@@ -37,19 +49,43 @@ std::vector<Vertex> Sampler::NextUntested(Vertex vertex, std::size_t num,
   return untested;
 }
 
+std::vector<Vertex> Sampler::UntestedOfNext(Vertex vertex, std::size_t num,
+                                            const MatchingGraph& graph) {
+  std::vector<Vertex> untested;
+  const auto take = [&](const std::vector<Vertex>& list) {
+    const std::size_t end = std::min(cursors_[vertex] + num, list.size());
+    for (std::size_t i = cursors_[vertex]; i < end; ++i) {
+      ++num_places_[vertex];
+      const Vertex other = list[i];
+      if (!graph.IsTested(vertex, other) && !options_.restrictions.SameFrame(vertex, other)) {
+        untested.push_back(other);
+      }
+    }
+  };
+  const std::vector<Vertex>& nearest = ranking_.NearestOf(vertex);
+  const bool needs_all =
+      cursors_[vertex] + num > nearest.size() && nearest.size() + 1 < ranking_.NumVertices();
+  take(needs_all ? ranking_.AllOf(vertex) : nearest);
+  return untested;
+}
+
 std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& graph) {
   const std::size_t num_vertices = ranking_.NumVertices();
   const int budget = options_.MaxTestsForSampling(num_vertices);
   const int tests = options_.TestsInIteration(iteration, num_vertices);
   threads_.ParallelFor(num_vertices, [&](std::size_t i) {
     const auto vertex = static_cast<Vertex>(i);
+    const bool gives_up = GivesUp(vertex, graph);
     drawn_[i].clear();
+    num_places_[i] = 0;
     const int num = std::min(tests, budget - num_drawn_[i]);
-    if (num <= 0 || !options_.restrictions.Seeks(vertex) ||
+    if (num <= 0 || gives_up || !options_.restrictions.Seeks(vertex) ||
         graph.Degree(vertex) >= static_cast<std::size_t>(options_.max_num_neighbors)) {
       return;
     }
-    drawn_[i] = NextUntested(vertex, static_cast<std::size_t>(num), graph);
+    const auto count = static_cast<std::size_t>(num);
+    drawn_[i] = options_.sample_untested_only ? NextUntested(vertex, count, graph)
+                                              : UntestedOfNext(vertex, count, graph);
   });
   std::vector<VertexPair> pairs;
   for (Vertex vertex = 0; vertex < num_vertices; ++vertex) {
@@ -58,6 +94,11 @@ std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& gra
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   return pairs;
+}
+
+bool Sampler::HasAdvanced() const {
+  return std::any_of(num_places_.begin(), num_places_.end(),
+                     [](std::size_t num_places) { return num_places > 0; });
 }
 
 void Sampler::ChargeTested(const MatchingGraph& graph) {
@@ -85,9 +126,12 @@ void Sampler::ChargeTested(const MatchingGraph& graph) {
 }
 
 void Sampler::Charge() {
+  for (std::size_t i = 0; i < drawn_.size(); ++i) cursors_[i] += num_places_[i];
   if (!options_.count_incoming_tests) {
-    for (std::size_t i = 0; i < drawn_.size(); ++i)
-      num_drawn_[i] += static_cast<int>(drawn_[i].size());
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      num_drawn_[i] +=
+          static_cast<int>(options_.sample_untested_only ? drawn_[i].size() : num_places_[i]);
+    }
     return;
   }
   for (Vertex vertex = 0; vertex < drawn_.size(); ++vertex) {

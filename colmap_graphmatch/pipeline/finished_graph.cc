@@ -39,11 +39,13 @@ class Reader {
     replayed.num_inliers = static_cast<std::uint32_t>(num_inliers);
     replayed.is_edge = IsEdge(num_inliers, config, min_num_inliers_);
     replayed.is_verified = num_matches >= min_num_inliers_;
-    graph_.num_edges += replayed.is_edge ? 1 : 0;
     graph_.pairs[ImagePair(id1->second, id2->second)] = replayed;
   }
 
-  FinishedGraph Finish() { return std::move(graph_); }
+  FinishedGraph Finish() {
+    for (const auto& [pair, replayed] : graph_.pairs) graph_.num_edges += replayed.is_edge ? 1 : 0;
+    return std::move(graph_);
+  }
 
  private:
   std::unordered_map<std::string, ImageId> ids_;
@@ -73,7 +75,7 @@ void ReadText(const std::filesystem::path& path, Reader* reader) {
        ReadLines(path, "edges", "lines of two image names and the number of inliers")) {
     std::vector<std::string> fields;
     boost::split(fields, line.text, boost::is_any_of("\t"));
-    std::size_t num_inliers = 0;
+    std::uint32_t num_inliers = 0;
     int config = kUncalibrated;
     const auto read = [&fields](std::size_t field, auto* value) {
       // lexical_cast takes -2 for a great number.
@@ -82,7 +84,7 @@ void ReadText(const std::filesystem::path& path, Reader* reader) {
               boost::conversion::try_lexical_convert(fields[field], *value));
     };
     bool readable = fields.size() >= 3 && read(2, &num_inliers) && read(3, &config);
-    std::size_t num_matches = num_inliers;
+    std::uint32_t num_matches = num_inliers;
     readable = readable && read(4, &num_matches);
     if (!readable && !may_be_header) {
       throw FileError("Line " + std::to_string(line.number) + " of " + path.string() +

@@ -45,9 +45,10 @@ std::string LoopKey(const PipelineOptions& options, const GraphMatchOptions& gra
   for (const int value :
        {graph.number_sample_iterations, graph.max_num_neighbors, graph.num_to_propagate,
         graph.max_tests_for_sampling, static_cast<int>(graph.sampling_schedule),
-        graph.count_incoming_tests ? 1 : 0, static_cast<int>(graph.propagation_distance),
-        graph.propagate_untested_only ? 1 : 0, graph.propagate_from_new_edges_only ? 1 : 0,
-        graph.stop_sampling_without_edges ? 1 : 0, options.verification.min_num_inliers}) {
+        graph.count_incoming_tests ? 1 : 0, graph.sample_untested_only ? 1 : 0,
+        static_cast<int>(graph.propagation_distance), graph.propagate_untested_only ? 1 : 0,
+        graph.propagate_from_new_edges_only ? 1 : 0, graph.stop_sampling_without_edges ? 1 : 0,
+        graph.max_failed_samples, options.verification.min_num_inliers}) {
     key += " " + std::to_string(value);
   }
   return key + ", restrictions " + std::to_string(restrictions.checksum());
@@ -97,6 +98,14 @@ void PipelineOptions::Check() const {
     throw OptionsError(
         "--GraphMatching.match_list_path lists pairs, --VocabTreeMatching.match_list_path images "
         "that look for partners: give one of them.");
+  }
+  const bool ranks = match_list_path.empty() && strategy != Strategy::kExhaustive;
+  if (!ranks && (!ranking.ranking_path.empty() || !ranking.export_path.empty() ||
+                 !ranking.vectors.vectors_path.empty())) {
+    throw OptionsError(
+        "--GraphMatching.ranking_path, --GraphMatching.vectors_path and "
+        "--GraphMatching.export_vectors need a strategy that ranks images; a list of pairs and the "
+        "strategy exhaustive do not.");
   }
   EffectiveNumThreads(num_threads);
   if (num_retrieved_images < 0) {
@@ -221,6 +230,7 @@ ReplayVerifier MakeReplayVerifier(const Job& job) {
   ReplayVerifier verifier(std::move(graph.pairs));
   std::unordered_map<ImageId, std::size_t> num_features;
   for (const ImageRecord& image : job.images) num_features[image.id] = image.num_features;
+  verifier.SetStop(&job.stop);
   verifier.SetCosts(options.replay_costs, std::move(num_features), job.threads.NumThreads());
   return verifier;
 }
@@ -245,7 +255,10 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
   if (!result.replayed) database.CheckWritable();
   const auto info = [&](const std::string& message) { observer.OnInfo(message); };
   const auto warn = [&](const std::string& warning) { observer.OnWarning(warning); };
-  RunState state(options.database_path, options.verification.lock_timeout, stop, info, warn);
+  // Nothing of a replay is for the next run on these photos.
+  RunState state = result.replayed ? RunState()
+                                   : RunState(options.database_path,
+                                              options.verification.lock_timeout, stop, info, warn);
   const std::vector<ImageRecord> images = WithFeatures(all_images);
   result.num_images = all_images.size();
   result.num_images_without_features = all_images.size() - images.size();

@@ -1,11 +1,16 @@
 #include "colmap_graphmatch/pipeline/image_ranking.h"
 
 #include <algorithm>
+#include <boost/crc.hpp>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/encoding/numpy_file.h"
+#include "colmap_graphmatch/pipeline/given_vectors.h"
 #include "colmap_graphmatch/pipeline/ranked_lists.h"
 #include "colmap_graphmatch/pipeline/text_file.h"
 #include "colmap_graphmatch/pipeline/timed.h"
@@ -13,9 +18,9 @@
 namespace colmap_graphmatch {
 namespace {
 
-void Describe(const GmmTraining& training, const ImageVectorOptions& options,
+void Describe(const VectorModelTraining& training, const ImageVectorOptions& options,
               PipelineObserver& observer) {
-  const auto num_components = training.mixture.NumComponents();
+  const auto num_components = training.model.mixture.NumComponents();
   if (num_components < options.gmm.num_components) {
     observer.OnWarning("The images have too few different features for " +
                        std::to_string(options.gmm.num_components) +
@@ -23,37 +28,57 @@ void Describe(const GmmTraining& training, const ImageVectorOptions& options,
                        ".");
   }
   observer.OnInfo("Learnt a mixture of " + std::to_string(num_components) + " Gaussians in " +
-                  std::to_string(training.log_likelihoods.size()) + " iterations of EM" +
+                  std::to_string(training.num_iterations) + " iterations of EM" +
                   (training.converged ? "" : " (not yet converged)") + ".");
 }
+
+}  // namespace
+
+const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor) {
+  switch (descriptor) {
+    case ImageVectorOptions::Descriptor::kFisher:
+      return "Fisher vectors";
+    case ImageVectorOptions::Descriptor::kVlad:
+      return "VLAD";
+    case ImageVectorOptions::Descriptor::kGist:
+      return "GIST";
+    case ImageVectorOptions::Descriptor::kFile:
+      break;
+  }
+  return "vectors";
+}
+
+namespace {
 
 // Images encoded at a time, and kept for the next run.
 constexpr std::size_t kImagesPerBlock = 2048;
 
-// The mixture that earlier runs used, or a new one.
-GaussianMixture FindMixture(const ImageVectorOptions& options, Database& database,
-                            const std::vector<ImageRecord>& images, RunState& state,
-                            ThreadPool& threads, const StopRequest& stop,
-                            PipelineObserver& observer) {
-  const std::optional<GaussianMixture> kept = state.ReadMixture();
+// The model that earlier runs used, or a new one.
+VectorModel FindModel(const ImageVectorOptions& options, Database& database,
+                      const std::vector<ImageRecord>& images, RunState& state, ThreadPool& threads,
+                      const StopRequest& stop, PipelineObserver& observer) {
+  const bool has_mixture = HasMixture(options.descriptor);
+  std::optional<VectorModel> kept = state.ReadModel();
   if (kept) {
-    observer.OnInfo("The mixture of " + std::to_string(kept->NumComponents()) +
-                    " Gaussians is that of the last run.");
-    return *kept;
+    if (has_mixture) {
+      observer.OnInfo("The mixture of " + std::to_string(kept->mixture.NumComponents()) +
+                      " Gaussians is that of the last run.");
+    }
+    return std::move(*kept);
   }
-  GmmTraining training = LearnMixture(options, database, images, threads, stop);
-  Describe(training, options, observer);
-  state.KeepMixture(training.mixture);
-  return std::move(training.mixture);
+  VectorModelTraining training = LearnVectorModel(options, database, images, threads, stop);
+  if (has_mixture) Describe(training, options, observer);
+  state.KeepModel(training.model);
+  return std::move(training.model);
 }
 
-// The Fisher vectors of all images: those of earlier runs, as long as the features are the same,
-// and new ones.
-std::vector<float> FindVectors(const ImageVectorOptions& options, const GaussianMixture& mixture,
+// The vectors of all images: those of earlier runs, as long as the features are the same, and new
+// ones.
+std::vector<float> FindVectors(const ImageVectorOptions& options, const VectorModel& model,
                                Database& database, const std::vector<ImageRecord>& images,
                                RunState& state, ThreadPool& threads, const StopRequest& stop,
                                PipelineObserver& observer) {
-  const auto dim = static_cast<std::size_t>(2 * mixture.NumComponents() * mixture.Dim());
+  const std::size_t dim = VectorDim(options, model);
   std::vector<float> vectors(images.size() * dim);
   const std::vector<bool> kept = state.ReadVectors(dim, vectors.data());
   std::vector<std::size_t> missing;
@@ -69,7 +94,7 @@ std::vector<float> FindVectors(const ImageVectorOptions& options, const Gaussian
     records.reserve(block.size());
     for (const std::size_t i : block) records.push_back(images[i]);
     const std::vector<float> encoded =
-        EncodeImages(options, mixture, database, records, threads, stop);
+        EncodeImages(options, model, database, records, threads, stop);
     for (std::size_t i = 0; i < block.size(); ++i) {
       std::copy_n(encoded.begin() + static_cast<std::ptrdiff_t>(i * dim), dim,
                   vectors.begin() + static_cast<std::ptrdiff_t>(block[i] * dim));
@@ -77,8 +102,8 @@ std::vector<float> FindVectors(const ImageVectorOptions& options, const Gaussian
     state.KeepVectors(block, dim, encoded.data());
   }
   const std::size_t num_kept = images.size() - missing.size();
-  observer.OnInfo("Described " + std::to_string(images.size()) + " images by Fisher vectors of " +
-                  std::to_string(dim) + " entries" +
+  observer.OnInfo("Described " + std::to_string(images.size()) + " images by " +
+                  NameOfVectors(options.descriptor) + " of " + std::to_string(dim) + " entries" +
                   (num_kept == 0 ? "."
                                  : "; those of " + std::to_string(num_kept) +
                                        " images are from the last run."));
@@ -109,9 +134,75 @@ void WarnOfChangedFeatures(const std::vector<ImageId>& changed,
                      database_path);
 }
 
+// Changes when a photo does, as far as its size and time tell. A photo that is missing is no error
+// here.
+std::string ChecksumOfPhotos(const std::filesystem::path& directory,
+                             const std::vector<ImageRecord>& images) {
+  boost::crc_32_type crc;
+  for (const ImageRecord& image : images) {
+    std::error_code ignored;
+    const std::filesystem::path photo = directory / image.name;
+    const std::uintmax_t size = std::filesystem::file_size(photo, ignored);
+    const auto time = std::filesystem::last_write_time(photo, ignored).time_since_epoch().count();
+    crc.process_bytes(&size, sizeof(size));
+    crc.process_bytes(&time, sizeof(time));
+  }
+  return std::to_string(crc.checksum());
+}
+
+RankedImages Rank(const ImageRankingOptions& options, std::vector<ImageRecord> images,
+                  std::size_t dim, std::vector<float> vectors, ThreadPool& threads,
+                  const StopRequest& stop, ImageRankingSeconds* seconds) {
+  RankedImages ranked;
+  ranked.images = std::move(images);
+  ranked.ranking = Timed(&seconds->ranking, [&] {
+    return std::make_unique<VectorRanking>(options.ranking, ranked.images.size(), dim,
+                                           std::move(vectors), threads, &stop);
+  });
+  return ranked;
+}
+
+RankedImages RankGivenVectors(const ImageRankingOptions& options,
+                              const std::vector<ImageRecord>& images,
+                              const std::vector<ImageFingerprint>& fingerprints, RunState& state,
+                              ThreadPool& threads, const StopRequest& stop,
+                              PipelineObserver& observer, ImageRankingSeconds* seconds) {
+  GivenVectors given = Timed(
+      &seconds->vectors, [&] { return ReadGivenVectors(options.vectors.vectors_path, images); });
+  WarnOfSkippedLines(given, options.vectors.vectors_path, "an image", observer);
+  if (given.images.size() < images.size()) {
+    observer.OnWarning(std::to_string(images.size() - given.images.size()) + " of " +
+                       std::to_string(images.size()) + " images have no vector in " +
+                       options.vectors.vectors_path.string() +
+                       " and are not ranked, so not matched.");
+  }
+  observer.OnInfo("Read " + std::to_string(given.images.size()) + " vectors of " +
+                  std::to_string(given.dim) + " entries.");
+  state.SelectGiven("vectors " + given.checksum, fingerprints);
+  return Rank(options, std::move(given.images), given.dim, std::move(given.rows), threads, stop,
+              seconds);
+}
+
 }  // namespace
 
-void ImageRankingOptions::Check() const { vectors.Check(); }
+void ImageRankingOptions::Check() const {
+  vectors.Check();
+  const bool given = vectors.descriptor == ImageVectorOptions::Descriptor::kFile;
+  if (!export_path.empty() && export_path.extension() != ".npy") {
+    throw OptionsError("--GraphMatching.export_vectors is " + export_path.string() +
+                       "; its name must end in .npy (the names go beside it, into .txt).");
+  }
+  if (!ranking_path.empty() && vectors.descriptor != ImageVectorOptions::Descriptor::kFisher) {
+    throw OptionsError(
+        "--GraphMatching.ranking_path and --GraphMatching.descriptor contradict each other: give "
+        "one of them.");
+  }
+  if (!export_path.empty() && (given || !ranking_path.empty())) {
+    throw OptionsError(
+        "--GraphMatching.export_vectors writes vectors that this program makes: there are none "
+        "with --GraphMatching.ranking_path or --GraphMatching.vectors_path.");
+  }
+}
 
 RankedImages RankImages(const ImageRankingOptions& options, Database& database,
                         const std::vector<ImageRecord>& images,
@@ -126,19 +217,29 @@ RankedImages RankImages(const ImageRankingOptions& options, Database& database,
     state.SelectGiven("ranked lists " + lists.checksum, fingerprints);
     return {images, std::move(lists.ranking)};
   }
-  state.Select(options.vectors, fingerprints);
+  if (options.vectors.descriptor == ImageVectorOptions::Descriptor::kFile) {
+    return RankGivenVectors(options, images, fingerprints, state, threads, stop, observer, seconds);
+  }
+  const bool reads_photos = options.vectors.descriptor == ImageVectorOptions::Descriptor::kGist;
+  state.Select(options.vectors, fingerprints,
+               reads_photos ? ChecksumOfPhotos(options.vectors.image_path, images) : "");
   WarnOfChangedFeatures(state.FindChanged(), images, known, database.Path().string(), observer);
-  const GaussianMixture mixture = Timed(&seconds->mixture, [&] {
-    return FindMixture(options.vectors, database, images, state, threads, stop, observer);
+  const VectorModel model = Timed(&seconds->mixture, [&] {
+    return FindModel(options.vectors, database, images, state, threads, stop, observer);
   });
   std::vector<float> vectors = Timed(&seconds->vectors, [&] {
-    return FindVectors(options.vectors, mixture, database, images, state, threads, stop, observer);
+    return FindVectors(options.vectors, model, database, images, state, threads, stop, observer);
   });
   const std::size_t dim = vectors.size() / images.size();
-  return {images, Timed(&seconds->ranking, [&] {
-            return std::make_unique<VectorRanking>(options.ranking, images.size(), dim,
-                                                   std::move(vectors), threads, &stop);
-          })};
+  if (!options.export_path.empty()) {
+    NamedVectors named;
+    for (const ImageRecord& image : images) named.names.push_back(image.name);
+    named.dim = dim;
+    named.rows = vectors;
+    WriteNamedVectors(options.export_path, named);
+    observer.OnInfo("Wrote the vectors to " + options.export_path.string() + ".");
+  }
+  return Rank(options, images, dim, std::move(vectors), threads, stop, seconds);
 }
 
 }  // namespace colmap_graphmatch

@@ -15,9 +15,15 @@
 
 namespace colmap_graphmatch {
 
+// For messages, e.g. "Fisher vectors".
+const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor);
+
 struct ImageRankingOptions {
   ImageVectorOptions vectors;
   RankingOptions ranking;
+
+  // Writes the vectors that are made to this file (encoding/numpy_file.h), unless it is empty.
+  std::filesystem::path export_path;
 
   // Takes the ranked lists from this file (see ranked_lists.h) instead of making vectors, unless it
   // is empty.

@@ -10,6 +10,8 @@
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/encoding/descriptor_selection.h"
 #include "colmap_graphmatch/encoding/fisher_vector.h"
+#include "colmap_graphmatch/encoding/gist.h"
+#include "colmap_graphmatch/encoding/vlad.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -56,8 +58,25 @@ void ForEachImage(const std::vector<ImageRecord>& images, ThreadPool& threads,
 
 }  // namespace
 
+bool HasMixture(ImageVectorOptions::Descriptor descriptor) {
+  return descriptor == ImageVectorOptions::Descriptor::kFisher ||
+         descriptor == ImageVectorOptions::Descriptor::kVlad;
+}
+
 void ImageVectorOptions::Check() const {
   gmm.Check();
+  if (pca_dim < 0 || pca_dim > kDescriptorDim) {
+    throw OptionsError("pca_dim is " + std::to_string(pca_dim) +
+                       "; it must be at most 128, or 0 for no PCA.");
+  }
+  if (descriptor == Descriptor::kGist && image_path.empty()) {
+    throw OptionsError("GIST describes the photos themselves: give --image_path, where they are.");
+  }
+  if ((descriptor == Descriptor::kFile) != !vectors_path.empty()) {
+    throw OptionsError(
+        "--GraphMatching.descriptor file and --GraphMatching.vectors_path belong together: give "
+        "both or none.");
+  }
   if (num_training_descriptors < 1) {
     throw OptionsError("num_training_descriptors is " + std::to_string(num_training_descriptors) +
                        "; the mixture needs at least 1.");
@@ -68,9 +87,11 @@ void ImageVectorOptions::Check() const {
   }
 }
 
-GmmTraining LearnMixture(const ImageVectorOptions& options, Database& database,
-                         const std::vector<ImageRecord>& images, ThreadPool& threads,
-                         const StopRequest& stop) {
+VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database& database,
+                                     const std::vector<ImageRecord>& images, ThreadPool& threads,
+                                     const StopRequest& stop) {
+  VectorModelTraining training;
+  if (!HasMixture(options.descriptor)) return training;
   const std::size_t per_image =
       (static_cast<std::size_t>(options.num_training_descriptors) + images.size() - 1) /
       images.size();
@@ -93,36 +114,73 @@ GmmTraining LearnMixture(const ImageVectorOptions& options, Database& database,
         samples.middleRows(first_rows[i], first_rows[i + 1] - first_rows[i]) =
             DescriptorsToFloat(selected.data.data(), selected.num);
       });
-  return TrainGmm(options.gmm, samples, threads, &stop);
+  if (options.pca_dim > 0) {
+    training.model.pca = LearnPca(samples, options.pca_dim, threads);
+    samples = training.model.pca.Project(samples);
+  }
+  GmmTraining gmm = TrainGmm(options.gmm, samples, threads, &stop);
+  training.model.mixture = std::move(gmm.mixture);
+  training.num_iterations = gmm.log_likelihoods.size();
+  training.converged = gmm.converged;
+  return training;
 }
 
-std::vector<float> EncodeImages(const ImageVectorOptions& options, const GaussianMixture& mixture,
+std::size_t VectorDim(const ImageVectorOptions& options, const VectorModel& model) {
+  const auto means = static_cast<std::size_t>(model.mixture.means.size());
+  switch (options.descriptor) {
+    case ImageVectorOptions::Descriptor::kFisher:
+      return 2 * means;
+    case ImageVectorOptions::Descriptor::kVlad:
+      return means;
+    case ImageVectorOptions::Descriptor::kGist:
+      return kGistDim;
+    case ImageVectorOptions::Descriptor::kFile:
+      break;
+  }
+  return 0;
+}
+
+std::vector<float> EncodeImages(const ImageVectorOptions& options, const VectorModel& model,
                                 Database& database, const std::vector<ImageRecord>& images,
                                 ThreadPool& threads, const StopRequest& stop) {
-  const FisherVectorEncoder encoder(mixture);
-  const auto dim = static_cast<std::size_t>(encoder.Dim());
-  const auto max_num_features = static_cast<std::size_t>(options.max_num_features);
+  const std::size_t dim = VectorDim(options, model);
   std::vector<float> vectors(images.size() * dim);
-  ForEachImage(
-      images, threads, stop,
-      [&](const ImageRecord& image) {
-        const Descriptors descriptors = database.ReadDescriptors(image);
-        if (options.feature_selection == ImageVectorOptions::FeatureSelection::kRandom) {
-          return SelectedDescriptors(
-              descriptors,
-              SelectRandom(descriptors.num_rows, max_num_features,
-                           ImageRandom(options, RandomStage::kFeatureSelection, image.id)));
-        }
-        const std::vector<float> scales =
-            database.ReadKeypoints(image.id).Scales(descriptors.num_rows);
-        return SelectedDescriptors(descriptors, SelectLargestScales(scales, max_num_features));
-      },
-      [&](std::size_t i, const SelectedDescriptors& selected) {
-        const Eigen::VectorXf vector =
-            encoder.Encode(DescriptorsToFloat(selected.data.data(), selected.num));
-        std::copy(vector.begin(), vector.end(),
-                  vectors.begin() + static_cast<std::ptrdiff_t>(i * dim));
-      });
+  const auto store = [&](std::size_t i, const Eigen::VectorXf& vector) {
+    std::copy(vector.begin(), vector.end(), vectors.begin() + static_cast<std::ptrdiff_t>(i * dim));
+  };
+  if (options.descriptor == ImageVectorOptions::Descriptor::kGist) {
+    threads.ParallelFor(images.size(), [&](std::size_t i) {
+      stop.ThrowIfRequested();
+      store(i, EncodeGistFile(options.image_path / images[i].name));
+    });
+    return vectors;
+  }
+
+  const auto max_num_features = static_cast<std::size_t>(options.max_num_features);
+  const auto select = [&](const ImageRecord& image) {
+    const Descriptors descriptors = database.ReadDescriptors(image);
+    if (options.feature_selection == ImageVectorOptions::FeatureSelection::kRandom) {
+      return SelectedDescriptors(
+          descriptors,
+          SelectRandom(descriptors.num_rows, max_num_features,
+                       ImageRandom(options, RandomStage::kFeatureSelection, image.id)));
+    }
+    const std::vector<float> scales = database.ReadKeypoints(image.id).Scales(descriptors.num_rows);
+    return SelectedDescriptors(descriptors, SelectLargestScales(scales, max_num_features));
+  };
+  const auto encode_with = [&](const auto& encoder) {
+    ForEachImage(
+        images, threads, stop, select, [&](std::size_t i, const SelectedDescriptors& selected) {
+          const RowMatrixXf descriptors = DescriptorsToFloat(selected.data.data(), selected.num);
+          store(i, model.pca.mean.size() > 0 ? encoder.Encode(model.pca.Project(descriptors))
+                                             : encoder.Encode(descriptors));
+        });
+  };
+  if (options.descriptor == ImageVectorOptions::Descriptor::kVlad) {
+    encode_with(VladEncoder(model.mixture));
+  } else {
+    encode_with(FisherVectorEncoder(model.mixture));
+  }
   return vectors;
 }
 

@@ -2,16 +2,35 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/encoding/gmm.h"
+#include "colmap_graphmatch/pipeline/vector_model.h"
 
 namespace colmap_graphmatch {
 
 struct ImageVectorOptions {
+  // kFisher: Fisher vectors of SIFT features (encoding/fisher_vector.h). For comparison kVlad: VLAD
+  // under the same mixture (encoding/vlad.h), kGist: GIST of the photos (encoding/gist.h), kFile:
+  // vectors that another program made (given_vectors.h).
+  enum class Descriptor { kFisher, kVlad, kGist, kFile };
+  Descriptor descriptor = Descriptor::kFisher;
+
+  // Where the photos are, for kGist.
+  std::filesystem::path image_path;
+
+  // Where the vectors are, for kFile.
+  std::filesystem::path vectors_path;
+
+  // PCA of the features to so many dimensions before the mixture, at most 128; 0: none. The paper
+  // has none, and 16 components: with as many entries a vector, 64 components in 32 dimensions find
+  // more edges in as many tests (docs/evaluation.md).
+  int pca_dim = 32;
+
   GmmOptions gmm;
 
   // Descriptors that the mixture is learnt from, the same number from every image (at least one,
@@ -31,15 +50,28 @@ struct ImageVectorOptions {
   void Check() const;
 };
 
-// Learns the mixture from the images, all of which must have features. Reads every image's
-// descriptors once and keeps the drawn ones alone. Throws StoppedError if stop asks for it.
-GmmTraining LearnMixture(const ImageVectorOptions& options, Database& database,
-                         const std::vector<ImageRecord>& images, ThreadPool& threads,
-                         const StopRequest& stop);
+bool HasMixture(ImageVectorOptions::Descriptor descriptor);
 
-// The Fisher vectors of the images, all of which must have features: images.size() rows of 2 K D
-// floats. Reads the next images while it encodes the last ones.
-std::vector<float> EncodeImages(const ImageVectorOptions& options, const GaussianMixture& mixture,
+struct VectorModelTraining {
+  VectorModel model;
+  std::size_t num_iterations = 0;  // Of EM.
+  bool converged = false;
+};
+
+// Learns what images are described with from images that all have features. Reads every image's
+// descriptors once and keeps the drawn ones alone. Nothing is learnt for kGist and kFile. Throws
+// StoppedError if stop asks for it.
+VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database& database,
+                                     const std::vector<ImageRecord>& images, ThreadPool& threads,
+                                     const StopRequest& stop);
+
+// The length of the vectors.
+std::size_t VectorDim(const ImageVectorOptions& options, const VectorModel& model);
+
+// The vectors of the images, all of which must have features: a row of VectorDim floats each. Reads
+// the next images while it encodes the last ones. Throws FileError if a photo is needed and cannot
+// be read.
+std::vector<float> EncodeImages(const ImageVectorOptions& options, const VectorModel& model,
                                 Database& database, const std::vector<ImageRecord>& images,
                                 ThreadPool& threads, const StopRequest& stop);
 

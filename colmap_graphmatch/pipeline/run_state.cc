@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <boost/crc.hpp>
-#include <cstring>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -16,57 +15,6 @@ std::string Hex(double value) {
   std::array<char, 32> text = {};
   std::snprintf(text.data(), text.size(), "%a", value);
   return text.data();
-}
-
-// K and D, the weights, the means, the variances.
-sqlite::Blob Serialize(const GaussianMixture& mixture) {
-  const std::array<std::int64_t, 2> shape = {mixture.NumComponents(), mixture.Dim()};
-  const auto size_of = [](const auto& matrix) {
-    return static_cast<std::size_t>(matrix.size()) * sizeof(double);
-  };
-  sqlite::Blob blob(sizeof(shape) + size_of(mixture.weights) + size_of(mixture.means) +
-                    size_of(mixture.variances));
-  std::uint8_t* target = blob.data();
-  const auto put = [&target](const void* data, std::size_t size) {
-    std::memcpy(target, data, size);
-    target += size;
-  };
-  put(shape.data(), sizeof(shape));
-  put(mixture.weights.data(), size_of(mixture.weights));
-  put(mixture.means.data(), size_of(mixture.means));
-  put(mixture.variances.data(), size_of(mixture.variances));
-  return blob;
-}
-
-// Nothing if it cannot be a mixture of at most max_num_components over SIFT descriptors.
-std::optional<GaussianMixture> Deserialize(const sqlite::Blob& blob, int max_num_components) {
-  std::array<std::int64_t, 2> shape = {};
-  if (blob.size() < sizeof(shape)) return std::nullopt;
-  std::memcpy(shape.data(), blob.data(), sizeof(shape));
-  if (shape[0] < 1 || shape[0] > max_num_components || shape[1] != kDescriptorDim) {
-    return std::nullopt;
-  }
-  const std::int64_t num_values = shape[0] * (1 + 2 * shape[1]);
-  if (blob.size() != sizeof(shape) + static_cast<std::size_t>(num_values) * sizeof(double)) {
-    return std::nullopt;
-  }
-  GaussianMixture mixture;
-  mixture.weights.resize(shape[0]);
-  mixture.means.resize(shape[0], shape[1]);
-  mixture.variances.resize(shape[0], shape[1]);
-  const std::uint8_t* source = blob.data() + sizeof(shape);
-  const auto take = [&source](auto* matrix) {
-    const std::size_t size = static_cast<std::size_t>(matrix->size()) * sizeof(double);
-    std::memcpy(matrix->data(), source, size);
-    source += size;
-  };
-  take(&mixture.weights);
-  take(&mixture.means);
-  take(&mixture.variances);
-  const bool is_mixture = mixture.weights.allFinite() && mixture.means.allFinite() &&
-                          mixture.variances.allFinite() && (mixture.weights.array() > 0).all() &&
-                          (mixture.variances.array() > 0).all();
-  return is_mixture ? std::optional<GaussianMixture>(std::move(mixture)) : std::nullopt;
 }
 
 std::string Checksum(const void* data, std::size_t size) {
@@ -126,13 +74,21 @@ void RunState::Try(const std::function<void()>& action) {
   }
 }
 
-void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images) {
+void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images,
+                      const std::string& photos_checksum) {
   images_ = std::move(images);
+  if (options.descriptor == ImageVectorOptions::Descriptor::kGist) {
+    shape_ = VectorModelShape();
+    vectors_key_ = "GIST of " + photos_checksum;
+    return;
+  }
   const GmmOptions& gmm = options.gmm;
-  max_num_components_ = gmm.num_components;
-  vectors_key_ = "components " + std::to_string(gmm.num_components) + ", tolerance " +
-                 Hex(gmm.tolerance) + ", iterations " + std::to_string(gmm.max_num_iterations) +
-                 ", variance floor " + Hex(gmm.variance_floor) + ", training " +
+  shape_ = {gmm.num_components, options.pca_dim};
+  vectors_key_ = "descriptor " + std::to_string(static_cast<int>(options.descriptor)) + ", PCA " +
+                 std::to_string(options.pca_dim) + ", components " +
+                 std::to_string(gmm.num_components) + ", tolerance " + Hex(gmm.tolerance) +
+                 ", iterations " + std::to_string(gmm.max_num_iterations) + ", variance floor " +
+                 Hex(gmm.variance_floor) + ", training " +
                  std::to_string(options.num_training_descriptors) + ", features " +
                  std::to_string(options.max_num_features) + ", selection " +
                  std::to_string(static_cast<int>(options.feature_selection)) + ", seed " +
@@ -150,22 +106,22 @@ std::vector<ImageId> RunState::FindChanged() {
   return changed;
 }
 
-std::optional<GaussianMixture> RunState::ReadMixture() {
-  std::optional<GaussianMixture> mixture;
+std::optional<VectorModel> RunState::ReadModel() {
+  std::optional<VectorModel> model;
   Try([&] {
     if (file_->CountVectors(images_) * 2 < images_.size()) return;
     const std::optional<sqlite::Blob> blob = file_->ReadMixture(vectors_key_);
     if (!blob) return;
-    mixture = Deserialize(*blob, max_num_components_);
-    mixture_checksum_ = Checksum(blob->data(), blob->size());
+    model = Deserialize(*blob, shape_);
+    model_checksum_ = Checksum(blob->data(), blob->size());
   });
-  return mixture;
+  return model;
 }
 
-void RunState::KeepMixture(const GaussianMixture& mixture) {
+void RunState::KeepModel(const VectorModel& model) {
   Try([&] {
-    const sqlite::Blob blob = Serialize(mixture);
-    mixture_checksum_ = Checksum(blob.data(), blob.size());
+    const sqlite::Blob blob = Serialize(model);
+    model_checksum_ = Checksum(blob.data(), blob.size());
     file_->WriteMixture(vectors_key_, blob);
   });
 }
@@ -194,7 +150,7 @@ std::string RunState::SeedsKey(const std::string& loop_key) const {
     crc.process_bytes(&image.id, sizeof(image.id));
     crc.process_bytes(&image.features, sizeof(image.features));
   }
-  return loop_key + ", " + vectors_key_ + ", mixture " + mixture_checksum_ + ", images " +
+  return loop_key + ", " + vectors_key_ + ", mixture " + model_checksum_ + ", images " +
          std::to_string(images_.size()) + " " + std::to_string(crc.checksum());
 }
 

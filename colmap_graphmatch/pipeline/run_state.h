@@ -11,8 +11,8 @@
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/database/state_file.h"
-#include "colmap_graphmatch/encoding/gmm.h"
 #include "colmap_graphmatch/pipeline/image_vectors.h"
+#include "colmap_graphmatch/pipeline/vector_model.h"
 
 namespace colmap_graphmatch {
 
@@ -22,13 +22,18 @@ class RunState {
  public:
   using Say = std::function<void(const std::string&)>;
 
+  // Keeps nothing and finds nothing.
+  RunState() = default;
+
   // Waits for another run on the same database, up to lock_timeout_seconds. Throws
   // DatabaseLockedError if it is still at work then; StoppedError if stop asks for it.
   RunState(const std::filesystem::path& database_path, double lock_timeout_seconds,
            const StopRequest& stop, const Say& info, const Say& warn);
 
-  // Chooses what is kept: vectors of these images under these options.
-  void Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images);
+  // Chooses what is kept: vectors of these images under these options. photos_checksum: of the
+  // files, for GIST.
+  void Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images,
+              const std::string& photos_checksum);
 
   // The same for a ranking that was given from outside and described by `ranking_key`: nothing but
   // the seeds is kept, and what is there of vectors stays.
@@ -37,17 +42,17 @@ class RunState {
   // The selected images whose features are not those of the last run.
   std::vector<ImageId> FindChanged();
 
-  // The mixture of an earlier run, if at least half of the images have a vector under it. With more
-  // new images than that it is worth learning another one.
-  std::optional<GaussianMixture> ReadMixture();
-  void KeepMixture(const GaussianMixture& mixture);
+  // What an earlier run learnt, if at least half of the images have a vector under it. With more
+  // new images than that it is worth learning anew.
+  std::optional<VectorModel> ReadModel();
+  void KeepModel(const VectorModel& model);
 
   // Fills the rows (dim floats) of the images that have a vector; true for each of them.
   std::vector<bool> ReadVectors(std::size_t dim, float* vectors);
   // vectors: a row for each of these images, given by their places among the selected ones.
   void KeepVectors(const std::vector<std::size_t>& which, std::size_t dim, const float* vectors);
 
-  // The seeds of the loop under the same images, mixture and loop_key; none if there are no such.
+  // The seeds of the loop under the same images, model and loop_key; none if there are no such.
   std::vector<ImagePair> ReadSeeds(const std::string& loop_key);
   void KeepSeeds(const std::string& loop_key, const std::vector<ImagePair>& seeds);
 
@@ -59,9 +64,9 @@ class RunState {
   Say warn_;
   std::unique_ptr<StateFile> file_;
   bool usable_ = false;
-  int max_num_components_ = 0;
+  VectorModelShape shape_;
   std::string vectors_key_;
-  std::string mixture_checksum_;
+  std::string model_checksum_;
   std::vector<ImageFingerprint> images_;
   bool dropped_others_ = false;  // The vectors of images that are not selected.
   std::optional<std::vector<ImagePair>> kept_seeds_;

@@ -1,13 +1,11 @@
 #include "colmap_graphmatch/report/json_report.h"
 
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <system_error>
+#include <string>
 
-#include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/version.h"
+#include "colmap_graphmatch/base/whole_file.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -18,6 +16,17 @@ Json Stage(const StageStatistics& stage) {
   return {{"tested", stage.num_tested},           {"edges", stage.num_edges},
           {"failed", stage.num_failed},           {"known", stage.num_known},
           {"known_edges", stage.num_known_edges}, {"seconds", stage.seconds}};
+}
+
+// The most memory that this process has had at a time, in MB; null where the system does not tell.
+// (Not from getrusage, which counts what the program was started from, too.)
+Json PeakMemory() {
+  const std::string key = "VmHWM:";
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind(key, 0) == 0) return std::stod(line.substr(key.size())) / 1024;
+  }
+  return nullptr;
 }
 
 const char* Name(const PipelineOptions& options) {
@@ -39,6 +48,21 @@ const char* Name(const PipelineOptions& options) {
   return "exhaustive";
 }
 
+const char* DescriptorName(const ImageRankingOptions& options) {
+  if (!options.ranking_path.empty()) return "lists";
+  switch (options.vectors.descriptor) {
+    case ImageVectorOptions::Descriptor::kFisher:
+      return "fisher";
+    case ImageVectorOptions::Descriptor::kVlad:
+      return "vlad";
+    case ImageVectorOptions::Descriptor::kGist:
+      return "gist";
+    case ImageVectorOptions::Descriptor::kFile:
+      break;
+  }
+  return "file";
+}
+
 }  // namespace
 
 std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult& result) {
@@ -51,9 +75,10 @@ std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult&
   report["finished"] = matching.finished;
   report["strategy"] = Name(options);
   if (!result.listed) {
-    report["descriptor"] = options.ranking.ranking_path.empty() ? "fisher" : "lists";
+    report["descriptor"] = DescriptorName(options.ranking);
   }
   report["threads"] = result.num_threads;
+  report["peak_memory_mb"] = PeakMemory();
   report["images"] = {{"total", result.num_images},
                       {"without_features", result.num_images_without_features},
                       {"isolated", matching.num_isolated + result.num_images_without_features}};
@@ -74,27 +99,16 @@ std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult&
                       {"expansion", Stage(matching.expansion)}};
   report["iterations"] = Json::array();
   for (const IterationStatistics& iteration : matching.iterations) {
-    report["iterations"].push_back(
-        {{"sampling", Stage(iteration.sampling)}, {"propagation", Stage(iteration.propagation)}});
+    report["iterations"].push_back({{"iteration", iteration.iteration},
+                                    {"sampling", Stage(iteration.sampling)},
+                                    {"propagation", Stage(iteration.propagation)}});
   }
   return report.dump(2) + "\n";
 }
 
 void WriteJsonReport(const std::filesystem::path& path, const PipelineOptions& options,
                      const PipelineResult& result) {
-  const std::filesystem::path partial = path.string() + ".partial";
-  const auto fail = [&](const std::string& reason) {
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
-    throw FileError("Cannot write the report " + path.string() + ": " + reason + ".");
-  };
-  std::ofstream file(partial, std::ios::trunc);
-  file << MakeJsonReport(options, result);
-  file.close();
-  if (!file) fail(std::strerror(errno));
-  std::error_code error;
-  std::filesystem::rename(partial, path, error);
-  if (error) fail(error.message());
+  WriteWholeFile(path, [&](std::ostream& file) { file << MakeJsonReport(options, result); });
 }
 
 }  // namespace colmap_graphmatch

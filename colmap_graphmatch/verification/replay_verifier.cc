@@ -46,6 +46,7 @@ double ReplayVerifier::Cost(const ImagePair& pair) const {
 bool ReplayVerifier::Verify(const std::vector<ImagePair>& pairs,
                             const std::function<void(const VerifiedPair&)>& on_verified) {
   for (const ImagePair& pair : pairs) {
+    if (stop_ != nullptr && stop_->Requested()) return false;
     modelled_seconds_ += Cost(pair) / num_threads_;
     on_verified(Answer(pair));
   }

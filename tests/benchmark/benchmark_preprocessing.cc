@@ -23,18 +23,19 @@ void Run(const char* path, int num_threads) {
   const std::vector<ImageRecord> images = WithFeatures(database.ReadImages());
   const double read = stopwatch.Seconds();
   const ImageVectorOptions options;
-  const GmmTraining training = LearnMixture(options, database, images, threads, StopRequest());
+  const VectorModelTraining training =
+      LearnVectorModel(options, database, images, threads, StopRequest());
   const double mixture = stopwatch.Seconds() - read;
   std::vector<float> vectors =
-      EncodeImages(options, training.mixture, database, images, threads, StopRequest());
+      EncodeImages(options, training.model, database, images, threads, StopRequest());
   const double encode = stopwatch.Seconds() - read - mixture;
   const std::size_t dim = vectors.size() / images.size();
-  const Ranking ranking(RankingOptions(), images.size(), dim, std::move(vectors), threads);
+  const VectorRanking ranking(RankingOptions(), images.size(), dim, std::move(vectors), threads);
   const double rank = stopwatch.Seconds() - read - mixture - encode;
   rusage usage = {};
   ::getrusage(RUSAGE_SELF, &usage);
   fmt::print("{:>8} {:>10.3f} {:>12.3f} {:>4} {:>15.3f} {:>10.3f} {:>9.3f} {:>9.0f}\n",
-             images.size(), read, mixture, training.log_likelihoods.size(), encode, rank,
+             images.size(), read, mixture, training.num_iterations, encode, rank,
              read + mixture + encode + rank, static_cast<double>(usage.ru_maxrss) / 1024);
 }
 

@@ -644,6 +644,29 @@ says 0 'Some lines of the list name no image of the database' 'correct the list 
 
 says 5 'The list of images that look for partners is missing' "$names" "${run[@]}" \
   --VocabTreeMatching.match_list_path "$work/images.txt"
+fresh
+given='correct the file'
+replay=(--GraphMatching.replay_path "$work/edges.tsv")
+says 5 'The finished graph to be replayed is missing' "$given" "${run[@]}" "${replay[@]}"
+printf 'a.jpg\tb.jpg\t20\n' >"$work/edges.tsv"
+says 5 'The finished graph names no image of the database' "$given" "${run[@]}" "${replay[@]}"
+echo 'a.jpg b.jpg' >>"$work/edges.tsv"
+says 5 'A line of the finished graph cannot be understood' "$given" "${run[@]}" "${replay[@]}"
+printf 'a.jpg\tb.jpg\n' >"$work/ranked.tsv"
+says 5 'A line of the ranked lists cannot be understood' "$given" "${run[@]}" \
+  --GraphMatching.ranking_path "$work/ranked.tsv"
+vectors=(--GraphMatching.descriptor file --GraphMatching.vectors_path "$work/vectors.npy")
+says 5 'The file of vectors is missing' "$given" "${run[@]}" "${vectors[@]}"
+echo 'no array' >"$work/vectors.npy"
+says 5 'The file of vectors is no NumPy array' "$given" "${run[@]}" "${vectors[@]}"
+piece='belong together' says 1 'Vectors of a file are asked for, and no file is given' "$mend" "${run[@]}" \
+  --GraphMatching.descriptor file
+piece='give --image_path' says 1 'GIST without the photos' "$mend" "${run[@]}" --GraphMatching.descriptor gist
+piece='there is no such file' says 5 'A photo is missing, for GIST' 'name the directory of the photos' "${run[@]}" \
+  --GraphMatching.descriptor gist --image_path "$work"
+says 5 'The log of tests cannot be written' 'name another file' "${run[@]}" --GraphMatching.test_log "$work/none/log.csv"
+partial=yes says 5 'The report cannot be written' 'name another file' "${run[@]}" \
+  --GraphMatching.report "$work/none/report.json"
 
 theme output
 works_with() {

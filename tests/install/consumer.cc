@@ -32,7 +32,7 @@ int main() {
   if (matcher.Match({descriptor.data(), 1}, {descriptor.data(), 1}).size() != 1) return 1;
 
   gm::ThreadPool threads(2);
-  const gm::Ranking ranking({}, 3, 2, {1, 0, 0.8F, 0.6F, 0, 1}, threads);
+  const gm::VectorRanking ranking({}, 3, 2, {1, 0, 0.8F, 0.6F, 0, 1}, threads);
   gm::ReplayVerifier verifier({{gm::ImagePair(1, 2), 30}, {gm::ImagePair(2, 3), 40}});
   const gm::GraphMatchResult result =
       gm::RunGraphMatch({}, ranking, {1, 2, 3}, verifier, threads, nullptr);

@@ -30,6 +30,9 @@ inline std::vector<std::set<VertexPair>> ReferenceGraphMatch(const GraphMatchOpt
   std::vector<VertexPair> edges;
   std::set<VertexPair> tested;
   std::map<Vertex, int> drawn;
+  std::map<Vertex, std::size_t> places;
+  std::map<Vertex, std::vector<Vertex>> last_drawn;
+  std::map<Vertex, int> failed;
   std::vector<std::set<VertexPair>> batches;
   std::size_t first_new_edge = 0;
   bool sampling_over = false;
@@ -60,16 +63,36 @@ inline std::vector<std::set<VertexPair>> ReferenceGraphMatch(const GraphMatchOpt
         const int left = options.MaxTestsForSampling(n) - drawn[i];
         int wanted = std::min(left, options.TestsInIteration(iteration, n));
         if (full(i)) wanted = 0;
+        for (const Vertex j : last_drawn[i])
+          failed[i] = neighbors[i].count(j) > 0 ? 0 : failed[i] + 1;
+        last_drawn[i].clear();
+        if (options.max_failed_samples > 0 && failed[i] >= options.max_failed_samples &&
+            !neighbors[i].empty()) {
+          wanted = 0;
+        }
         std::vector<Vertex> list;
         for (Vertex j = 0; j < n; ++j) {
           if (j != i) list.push_back(j);
         }
         std::sort(list.begin(), list.end(), by_distance_to(i));
-        for (const Vertex j : list) {
+        std::size_t& place = places[i];
+        for (std::size_t k = options.sample_untested_only ? 0 : place; k < list.size(); ++k) {
           if (wanted <= 0) break;
-          if (tested.count(MakeVertexPair(i, j)) > 0) continue;
+          const Vertex j = list[k];
+          const bool is_tested = tested.count(MakeVertexPair(i, j)) > 0;
+          if (!options.sample_untested_only) {
+            ++place;
+            --wanted;
+            if (!options.count_incoming_tests) ++charged[i];
+            if (is_tested) continue;
+            sampled.insert(MakeVertexPair(i, j));
+            last_drawn[i].push_back(j);
+            continue;
+          }
+          if (is_tested) continue;
           --wanted;
           sampled.insert(MakeVertexPair(i, j));
+          last_drawn[i].push_back(j);
           if (!options.count_incoming_tests) ++charged[i];
         }
       }
@@ -113,8 +136,9 @@ inline std::vector<std::set<VertexPair>> ReferenceGraphMatch(const GraphMatchOpt
     verify(propagated);
     bool more = false;
     for (int later = iteration + 1; later < options.number_sample_iterations; ++later) {
-      more = more || (options.TestsInIteration(iteration, n) == 0 && !sampling_over &&
-                      options.TestsInIteration(later, n) > 0);
+      const bool none_now =
+          !options.sample_untested_only || options.TestsInIteration(iteration, n) == 0;
+      more = more || (none_now && !sampling_over && options.TestsInIteration(later, n) > 0);
     }
     if (sampled.empty() && propagated.empty() && !more) return batches;
   }
