@@ -30,3 +30,26 @@ sqlite3 "$work/demo/database.db" "SELECT a.name, b.name FROM two_view_geometries
   awk -F '[\t|]' 'NR == FNR { if (FNR > 2) monument[$1] = $2; next }
                   monument[$1] != monument[$2] { print "edge between monuments: " $0; bad = 1 }
                   END { exit bad }' "$work/demo/cameras.tsv" -
+
+# All systems on these photos, COLMAP's vocabulary tree and mapper included.
+/usr/bin/python3 -c 'import numpy, matplotlib' 2>/dev/null ||
+  { echo "Not compared: python3-numpy and python3-matplotlib are not installed."; exit 0; }
+features=$work/demo/database.db
+tree=$work/tree.bin
+colmap vocab_tree_builder --database_path "$features" --vocab_tree_path "$tree" --num_visual_words 512 --branching 8 \
+  >"$work/tree.log" 2>&1 || { tail -n 5 "$work/tree.log"; fail "vocab_tree_builder"; }
+evaluation=("$root/scripts/benchmark" --matcher "$matcher" --database_path "$features" --image_path "$work/demo/images"
+  --vocab_tree_path "$tree" --output_path "$work/evaluation")
+expect_exit 0 'Wrote' "${evaluation[@]}" --mapper graphmatch
+/usr/bin/python3 - "$work/evaluation/table.csv" <<'END'
+import csv, sys
+rows = {row["system"]: row for row in csv.DictReader(open(sys.argv[1]))}
+for system in ("Exhaustive", "Vocabulary tree, k = 120", "BRIAD on the tree, k = 40", "Retrieval (Fisher), k = 120",
+               "BRIAD (Fisher), k = 40", "GraphMatch (Fisher)", "GraphMatch (VLAD, 16 centres)", "GraphMatch (GIST)"):
+    assert float(rows[system]["recall"]) > 0.9, rows[system]
+for system in ("Exhaustive", "GraphMatch (Fisher)"):
+    assert rows[system]["registered"] == "42", rows[system]
+assert float(rows["GraphMatch (Fisher)"]["camera distance median %"]) < 2, rows["GraphMatch (Fisher)"]
+END
+for figure in registered roc; do [[ -s $work/evaluation/figures/$figure.png ]] || fail "no figure $figure"; done
+expect_exit 1 'there is no system nothing' "${evaluation[@]}" --mapper nothing

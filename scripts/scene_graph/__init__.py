@@ -1,0 +1,1 @@
+"""Matching graphs and image vectors with the statistics of internet photo collections."""
