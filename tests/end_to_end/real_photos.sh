@@ -106,9 +106,10 @@ kills=0
 next=0
 while kill -0 "$pid" 2>/dev/null; do
   tested=$(count_tested "$work/disturbed.db")
+  # (Not the one that is asked for its options before anything else.)
   # Before the next kill, more shards are finished than can have been under way.
   if ((kills < 3 && tested >= next)) &&
-    pkill -KILL --oldest --parent "$pid" --full matches_importer; then
+    pkill -KILL --oldest --parent "$pid" --full 'matches_importer --database_path'; then
     kills=$((kills + 1))
     next=$((tested + 8 * ($(nproc) + 1)))
   fi
