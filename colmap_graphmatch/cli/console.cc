@@ -61,6 +61,43 @@ std::string FormatVerification(const VerifierStatistics& statistics) {
   return text;
 }
 
+std::string FormatImages(const PipelineResult& result) {
+  std::string text = fmt::format("\nImages             {}", result.num_images);
+  if (result.num_images_without_features > 0) {
+    text += fmt::format(" ({} without features)", result.num_images_without_features);
+  }
+  return text + "\n";
+}
+
+std::string FormatDryRun(const PipelineResult& result) {
+  std::string text = FormatImages(result);
+  text += fmt::format(
+      "Candidates         {} pairs that are not tested yet: each image with its {}\n",
+      result.candidates.size(), fmt::format("{} nearest", result.num_candidates_per_image));
+  text += "Dry run            nothing was tested, and nothing written to the database\n";
+  text += fmt::format("Time               {}\n", FormatDuration(result.total_seconds));
+  return text;
+}
+
+std::string FormatStoppedBy(const PipelineOptions& options, const PipelineResult& result) {
+  std::string limit;
+  switch (result.stopped_by) {
+    case PipelineResult::StoppedBy::kNothing:
+      return "";
+    case PipelineResult::StoppedBy::kRequest:
+      limit = "as asked";
+      break;
+    case PipelineResult::StoppedBy::kMaxPairs:
+      limit = fmt::format("after max_pairs = {}", options.budget.max_pairs);
+      break;
+    case PipelineResult::StoppedBy::kMaxMinutes:
+      limit = fmt::format("by max_minutes = {:g}", options.budget.max_minutes);
+      break;
+  }
+  return fmt::format("Stopped            {}; about {} more tests were to come\n", limit,
+                     result.num_expected_tests_left);
+}
+
 }  // namespace
 
 Console::Console(std::FILE* stream)
@@ -151,6 +188,7 @@ std::string FormatProgress(const LoopProgress& progress, double seconds_of_match
 }
 
 std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result) {
+  if (result.dry_run) return FormatDryRun(result);
   const GraphMatchResult& matching = result.matching;
   const auto num_images =
       static_cast<double>(result.num_images - result.num_images_without_features);
@@ -158,11 +196,8 @@ std::string FormatSummary(const PipelineOptions& options, const PipelineResult& 
   const StageStatistics all = matching.All();
   const bool listed = result.listed;
 
-  std::string text = fmt::format("\nImages             {}", result.num_images);
-  if (result.num_images_without_features > 0) {
-    text += fmt::format(" ({} without features)", result.num_images_without_features);
-  }
-  text += fmt::format("\nPairs tested       {} of {:.0f} possible ({:.2f} %)\n", all.num_tested,
+  std::string text = FormatImages(result);
+  text += fmt::format("Pairs tested       {} of {:.0f} possible ({:.2f} %)\n", all.num_tested,
                       num_possible, Share(all.num_tested, num_possible));
   if (matching.num_seed_pairs > 0) {
     text += fmt::format("Already there      {} pairs{}, {} edges\n", matching.num_seed_pairs,
@@ -187,6 +222,7 @@ std::string FormatSummary(const PipelineOptions& options, const PipelineResult& 
                   matching.graph.NumEdges(), matching.num_components, matching.largest_component);
   text += fmt::format("Without an edge    {} images\n",
                       matching.num_isolated + result.num_images_without_features);
+  text += FormatStoppedBy(options, result);
   if (!matching.failed_pairs.empty()) {
     text += fmt::format("Failed             {} pairs, see the warnings; they stay untested\n",
                         matching.failed_pairs.size());

@@ -16,6 +16,7 @@
 #include "colmap_graphmatch/cli/exit_codes.h"
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/report/exports.h"
 #include "colmap_graphmatch/report/json_report.h"
 
 namespace colmap_graphmatch {
@@ -55,19 +56,38 @@ void WarnIfNotWritten(const std::ostream& stream) {
             << ". Nothing else is lost." << std::endl;
 }
 
+// The files that were asked for.
+void WriteFiles(const CommandLine& line, const PipelineResult& result, Console& console) {
+  if (!line.report_path.empty()) WriteJsonReport(line.report_path, line.pipeline, result);
+  if (!line.pair_list_path.empty() && WritePairList(line.pair_list_path, result)) {
+    console.OnWarning("Some names of images have spaces: lines of " + line.pair_list_path.string() +
+                      " with such a name have a tab between the names, and COLMAP and hloc cannot "
+                      "read them; --GraphMatching.match_list_path can.");
+  }
+  if (!line.graph_path.empty()) WriteGraph(line.graph_path, result);
+}
+
 int Run(const CommandLine& line) {
   InstallSignalHandlers();
   Console console(stderr);
   for (const std::string& message : line.unused_options) console.OnInfo(message);
   for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
-    if (!line.report_path.empty()) CheckCanWrite(line.report_path);
+    for (const auto& path : {line.report_path, line.pair_list_path, line.graph_path}) {
+      if (!path.empty()) CheckCanWrite(path);
+    }
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
     console.ClearProgress();
     std::cout << FormatSummary(line.pipeline, result) << std::flush;
     WarnIfNotWritten(std::cout);
-    if (!line.report_path.empty()) WriteJsonReport(line.report_path, line.pipeline, result);
+    WriteFiles(line, result, console);
     if (result.matching.finished) return kExitSuccess;
+    if (result.stopped_by != PipelineResult::StoppedBy::kRequest) {
+      console.OnInfo(
+          "The budget is used up. Everything verified so far is in the database; the same command "
+          "goes on from here, with the same budget anew.");
+      return kExitSuccess;
+    }
   } catch (const StoppedError&) {
     // Before the first pair: there is nothing to sum up.
   }

@@ -101,6 +101,17 @@ Value NumThreadsOf(int* field) {
           }};
 }
 
+// 0 stands for no limit.
+Value CountOf(std::size_t* field) {
+  return {"an integer of at least 0", std::to_string(*field), [field](const std::string& text) {
+            const std::optional<std::size_t> value = Number<std::size_t>(text);
+            // lexical_cast takes -2 for a great number.
+            if (!value || text.find('-') != std::string::npos) return false;
+            *field = *value;
+            return true;
+          }};
+}
+
 // COLMAP takes -1 for a seed from the clock.
 Value SeedOf(CommandLine* line) {
   std::uint64_t* field = &line->pipeline.seed;
@@ -343,6 +354,15 @@ void Table::AddGraph() {
   AddName("VocabTreeMatching.num_images", &neighbors);
   Add("GraphMatching.num_to_propagate", IntOf(&p.graph.num_to_propagate, 0),
       "images (>= 0) that each neighbour hands on to an image in an iteration");
+  Add("GraphMatching.max_pairs", CountOf(&p.budget.max_pairs),
+      "pairs (>= 0) that the run may test, the most promising of each batch first; a later run "
+      "goes on; 0: no limit");
+  Add("GraphMatching.max_minutes", DoubleOf(&p.budget.max_minutes, Zero::kAllowed),
+      "minutes (>= 0) that the run may take, pre-processing included; 0: no limit");
+  Add("GraphMatching.dry_run", BoolOf(&p.dry_run),
+      "only rank the images: the first candidates are counted, and written by export_pairs; "
+      "nothing "
+      "is verified, nothing written to the database, and COLMAP is not run");
   Add("GraphMatching.num_retrieved_images", IntOf(&p.num_retrieved_images, 0),
       "images (>= 1) that retrieval and briad test each image with; 0: 120, and 40 for briad");
   Add("GraphMatching.num_expansions", IntOf(&p.num_expansions, 0),
@@ -375,7 +395,7 @@ void Table::AddVectors() {
       "what describes an image: Fisher vectors of its features; for comparison VLAD of them, GIST "
       "of the photo, or vectors of another program from a file");
   Add("image_path", TextOf(&vectors.image_path, "the path of a directory"),
-      "the directory of the photos; needed for the descriptor gist alone");
+      "the directory of the photos: for the descriptor gist, and to show photos in the report");
   Add("GraphMatching.vectors_path", TextOf(&vectors.vectors_path, "the path of a .npy file"),
       "for the descriptor file: a NumPy array, a row of float32 or float64 for each image; the "
       "images' names are in the file of the same name with .txt instead of .npy, one a line");
@@ -434,7 +454,15 @@ void Table::AddEvaluation() {
   PipelineOptions& p = line_->pipeline;
   Section("GraphMatch: what a run tells, and how it is compared with others");
   Add("GraphMatching.report", TextOf(&line_->report_path, "the path of a file"),
-      "a JSON file to write with what was found and what it cost");
+      "a page (.html, and the same as .json beside it) or a JSON file to write with what was "
+      "found, "
+      "what it cost, and what is wrong with images that match nothing. With --image_path the page "
+      "shows the photos");
+  Add("GraphMatching.export_pairs", TextOf(&line_->pair_list_path, "the path of a file"),
+      "write the edges, those with the most inliers first, as a list of pairs as COLMAP and hloc "
+      "read it; in a dry run the candidates, nearest first");
+  Add("GraphMatching.export_graph", TextOf(&line_->graph_path, "the path of a file"),
+      "write the matching graph as GraphML, or for Graphviz (.dot)");
   Add("GraphMatching.test_log", TextOf(&p.test_log_path, "the path of a file"),
       "a CSV file to write with every pair that is tested");
   Add("GraphMatching.replay_path",

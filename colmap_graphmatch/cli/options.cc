@@ -126,10 +126,29 @@ class Parser {
           std::to_string(p.seed % (std::uint64_t{1} << 31U));
     }
     p.verification.num_threads = p.num_threads;
+    CheckOutputs();
     p.Check();
   }
 
  private:
+  void CheckOutputs() {
+    PipelineOptions& p = line_->pipeline;
+    const auto& graph = line_->graph_path;
+    if (p.dry_run && (!line_->report_path.empty() || !graph.empty() || !p.test_log_path.empty())) {
+      throw OptionsError(
+          "With --GraphMatching.dry_run nothing is tested: there is nothing for "
+          "--GraphMatching.report, --GraphMatching.export_graph or --GraphMatching.test_log to "
+          "tell. --GraphMatching.export_pairs writes the candidates.");
+    }
+    const std::string ending = graph.extension().string();
+    if (!graph.empty() && ending != ".graphml" && ending != ".dot" && ending != ".gv") {
+      throw OptionsError("--GraphMatching.export_graph is " + graph.string() +
+                         "; it must end in .graphml, or in .dot or .gv for Graphviz.");
+    }
+    p.keep_details =
+        !line_->report_path.empty() || !line_->pair_list_path.empty() || !graph.empty();
+  }
+
   struct Given {
     std::string name;
     std::string value;

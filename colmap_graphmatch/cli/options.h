@@ -15,6 +15,8 @@ struct CommandLine {
   bool version = false;
   std::filesystem::path project_path;
   std::filesystem::path report_path;
+  std::filesystem::path pair_list_path;
+  std::filesystem::path graph_path;
   bool seed_from_clock = false;
   bool lightglue = false;  // The matcher's type is SIFT_LIGHTGLUE.
   // What is to be said about options of vocab_tree_matcher that were given and have no meaning

@@ -432,6 +432,16 @@ std::vector<TestedPair> Database::ReadTestedPairs() {
   return tested;
 }
 
+std::vector<VerifiedPair> Database::ReadVerifiedPairs(std::size_t min_num_inliers) {
+  std::vector<VerifiedPair> pairs;
+  for (const TestedPair& tested : ReadTestedPairs()) {
+    const bool is_edge = IsEdge(tested.num_inliers, tested.config, min_num_inliers);
+    pairs.push_back({tested.pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
+                     static_cast<std::uint32_t>(tested.num_inliers)});
+  }
+  return pairs;
+}
+
 std::unordered_map<ImagePair, std::size_t> Database::ReadNumMatches() {
   sqlite::Statement select(connection_, "SELECT pair_id, rows FROM matches ORDER BY pair_id");
   std::unordered_map<ImagePair, std::size_t> num_matches;

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/features.h"
 #include "colmap_graphmatch/database/sqlite.h"
@@ -87,6 +88,8 @@ class Database {
   // left out. (COLMAP's matchers also ask for
   // a row in `matches` before they skip a pair; what is verified is never verified again here.)
   std::vector<TestedPair> ReadTestedPairs();
+  // The same, judged by IsEdge.
+  std::vector<VerifiedPair> ReadVerifiedPairs(std::size_t min_num_inliers);
 
   // The number of matches of every pair that has a row in `matches`.
   std::unordered_map<ImagePair, std::size_t> ReadNumMatches();

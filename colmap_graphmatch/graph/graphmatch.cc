@@ -38,6 +38,8 @@ class Loop {
       if (!add_known_at_the_end || !builder_.AddKnown()) break;
       sampler_.ChargeTested(builder_.Graph());
     }
+    // A run that was stopped may not have come to all of it.
+    if (add_known_at_the_end) builder_.AddKnown();
     GraphMatchResult result = builder_.Finish();
     result.iterations = std::move(iterations_);
     return result;

@@ -43,6 +43,20 @@ void RetrievalOptions::Check() const {
   }
 }
 
+std::vector<VertexPair> RetrievePairs(const RetrievalOptions& options, const Ranking& ranking,
+                                      ThreadPool& threads) {
+  const std::size_t num_vertices = ranking.NumVertices();
+  return Unite(num_vertices, options.restrictions, threads,
+               [&](Vertex vertex, std::vector<Vertex>* partners) {
+                 const auto num = static_cast<std::size_t>(options.num_images);
+                 *partners = ranking.NearestOf(vertex);
+                 if (partners->size() < std::min(num, num_vertices - 1)) {
+                   *partners = ranking.AllOf(vertex);
+                 }
+                 partners->resize(std::min(num, partners->size()));
+               });
+}
+
 GraphMatchResult RunRetrieval(const RetrievalOptions& options, const Ranking& ranking,
                               const std::vector<ImageId>& image_ids, PairVerifier& verifier,
                               ThreadPool& threads,
@@ -51,17 +65,7 @@ GraphMatchResult RunRetrieval(const RetrievalOptions& options, const Ranking& ra
   const std::size_t num_vertices = ranking.NumVertices();
   if (image_ids.size() != num_vertices) throw OptionsError("Every ranked image needs its id.");
   GraphBuilder builder(image_ids, verifier, on_progress);
-  const std::vector<VertexPair> retrieved =
-      Unite(num_vertices, options.restrictions, threads,
-            [&](Vertex vertex, std::vector<Vertex>* partners) {
-              const auto num = static_cast<std::size_t>(options.num_images);
-              *partners = ranking.NearestOf(vertex);
-              if (partners->size() < std::min(num, num_vertices - 1)) {
-                *partners = ranking.AllOf(vertex);
-              }
-              partners->resize(std::min(num, partners->size()));
-            });
-  builder.Verify(LoopStage::kRetrieval, 0, retrieved, 0);
+  builder.Verify(LoopStage::kRetrieval, 0, RetrievePairs(options, ranking, threads), 0);
   for (int round = 0; round < options.num_expansions && builder.Continues(); ++round) {
     const MatchingGraph& graph = builder.Graph();
     const std::vector<VertexPair> expanded =

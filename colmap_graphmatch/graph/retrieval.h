@@ -27,6 +27,10 @@ struct RetrievalOptions {
   void Check() const;
 };
 
+// Every image with its num_images nearest ones: the pairs ascending, each once.
+std::vector<VertexPair> RetrievePairs(const RetrievalOptions& options, const Ranking& ranking,
+                                      ThreadPool& threads);
+
 // The rivals of the paper (GraphMatch, section 4): every image is tested with its nearest ones, all
 // in one batch; then, in each round of query expansion, with the neighbours of its neighbours in
 // the graph that was found before (Agarwal et al., Building Rome in a Day, ICCV 2009, section 3.3:

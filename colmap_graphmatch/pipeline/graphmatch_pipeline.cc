@@ -4,7 +4,9 @@
 #include <boost/crc.hpp>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -112,7 +114,14 @@ void PipelineOptions::Check() const {
     throw OptionsError("num_retrieved_images is " + std::to_string(num_retrieved_images) +
                        "; it must be positive, or 0 to have it chosen.");
   }
+  if (dry_run && (!ranks || !replay_path.empty())) {
+    throw OptionsError(
+        "--GraphMatching.dry_run shows which pairs a strategy that ranks images would test first; "
+        "with a list of pairs, the strategy exhaustive or --GraphMatching.replay_path there is "
+        "nothing to show.");
+  }
   MakeRetrievalOptions(*this).Check();
+  budget.Check();
   ranking.Check();
   graph.Check();
   verification.Check();
@@ -132,9 +141,13 @@ struct Job {
   const std::vector<ImageRecord>& images;  // Those with features.
   std::vector<ImagePair> listed_pairs;     // Of match_list_path.
   std::vector<ImageId> seeking;            // Of image_list_path.
+  std::function<double()> seconds;         // Since the start of the run.
 };
 
 using OnProgress = std::function<void(const LoopProgress&)>;
+
+// An image without an edge is explained by so many candidates.
+constexpr std::size_t kMaxCandidatesInReport = 5;
 
 PairRestrictions FindRestrictions(const Job& job, const std::vector<ImageRecord>& images) {
   PairRestrictions restrictions;
@@ -154,49 +167,133 @@ PairRestrictions FindRestrictions(const Job& job, const std::vector<ImageRecord>
   return restrictions;
 }
 
+RankedImages Rank(const Job& job, const std::vector<VerifiedPair>& known, PipelineResult* result) {
+  ImageRankingOptions options = job.options.ranking;
+  options.vectors.seed = job.options.seed;
+  options.vectors.gmm.seed = job.options.seed;
+  return RankImages(options, job.database, job.images, known, job.state, job.threads, job.stop,
+                    job.observer, &result->preprocessing_seconds);
+}
+
+// Lists that are cut short by a budget are taken from their beginning.
+BudgetedVerifier::Order OrderOfList(const std::vector<ImagePair>& listed) {
+  auto places = std::make_shared<std::unordered_map<ImagePair, std::size_t>>();
+  for (const ImagePair& pair : listed) places->emplace(pair, places->size());
+  return [places](const ImagePair& pair) { return static_cast<double>(places->at(pair)); };
+}
+
+BudgetedVerifier::Order OrderOfRanking(const Ranking& ranking, const std::vector<ImageId>& ids) {
+  return [&ranking, &ids](const ImagePair& pair) {
+    const auto vertex = [&ids](ImageId id) {
+      return static_cast<Vertex>(std::lower_bound(ids.begin(), ids.end(), id) - ids.begin());
+    };
+    return static_cast<double>(ranking.Distance(vertex(pair.id1), vertex(pair.id2)));
+  };
+}
+
+// Tests pairs with test(verifier) as long as the budget lasts.
+template <typename Test>
+GraphMatchResult TestWithinBudget(const Job& job, PairVerifier& verifier,
+                                  const BudgetedVerifier::Order& order, PipelineResult* result,
+                                  const Test& test) {
+  BudgetedVerifier budgeted(verifier, job.options.budget, job.threads.NumThreads(), job.seconds,
+                            order);
+  const GraphMatchResult matching =
+      Timed(&result->matching_seconds, [&]() -> GraphMatchResult { return test(budgeted); });
+  if (!matching.finished) {
+    using Limit = BudgetedVerifier::Limit;
+    using StoppedBy = PipelineResult::StoppedBy;
+    result->stopped_by = budgeted.Reached() == Limit::kMaxPairs     ? StoppedBy::kMaxPairs
+                         : budgeted.Reached() == Limit::kMaxMinutes ? StoppedBy::kMaxMinutes
+                                                                    : StoppedBy::kRequest;
+  }
+  return matching;
+}
+
+void KeepDetails(const Job& job, const PairVerifier& verifier, const Ranking* ranking,
+                 const std::vector<ImageId>& ids, RunRecord* record, PipelineResult* result) {
+  if (!job.options.keep_details) return;
+  record->AddKnown(verifier.KnownPairs(), job.images);
+  result->discovery = record->Discovery();
+  result->tested = record->Tested();
+  result->images = job.all_images;
+  result->images_without_edge =
+      FindImagesWithoutEdge(job.all_images, result->tested, ranking, ids, kMaxCandidatesInReport);
+}
+
 // Tests the pairs that the strategy asks for.
 GraphMatchResult FindEdges(const Job& job, PairVerifier& verifier, const OnProgress& on_progress,
-                           PipelineResult* result) {
+                           RunRecord* record, PipelineResult* result) {
   const PipelineOptions& options = job.options;
   if (result->listed) {
     const PairRestrictions restrictions = FindRestrictions(job, job.images);
     const std::vector<ImageId> ids = Ids(job.images);
-    return Timed(&result->matching_seconds, [&] {
-      return options.match_list_path.empty()
-                 ? VerifyAllPairs(ids, verifier, on_progress, restrictions)
-                 : VerifyListedPairs(job.listed_pairs, ids, verifier, on_progress, restrictions);
-    });
+    const bool all = options.match_list_path.empty();
+    const BudgetedVerifier::Order order =
+        all ? BudgetedVerifier::Order() : OrderOfList(job.listed_pairs);
+    GraphMatchResult matching =
+        TestWithinBudget(job, verifier, order, result, [&](PairVerifier& budgeted) {
+          return all ? VerifyAllPairs(ids, budgeted, on_progress, restrictions)
+                     : VerifyListedPairs(job.listed_pairs, ids, budgeted, on_progress,
+                                         restrictions);
+        });
+    KeepDetails(job, verifier, nullptr, {}, record, result);
+    return matching;
   }
 
-  ImageRankingOptions ranking_options = options.ranking;
-  ranking_options.vectors.seed = options.seed;
-  ranking_options.vectors.gmm.seed = options.seed;
-  const RankedImages ranked =
-      RankImages(ranking_options, job.database, job.images, verifier.KnownPairs(), job.state,
-                 job.threads, job.stop, job.observer, &result->preprocessing_seconds);
+  const RankedImages ranked = Rank(job, verifier.KnownPairs(), result);
   const Ranking& ranking = *ranked.ranking;
   const std::vector<ImageId> ids = Ids(ranked.images);
   const PairRestrictions restrictions = FindRestrictions(job, ranked.images);
-  return Timed(&result->matching_seconds, [&] {
+  const auto test = [&](PairVerifier& budgeted) {
     if (RetrievesOnce(options.strategy)) {
       RetrievalOptions retrieval = MakeRetrievalOptions(options);
       retrieval.restrictions = restrictions;
-      return RunRetrieval(retrieval, ranking, ids, verifier, job.threads, on_progress);
+      return RunRetrieval(retrieval, ranking, ids, budgeted, job.threads, on_progress);
     }
     GraphMatchOptions graph = MakeGraphOptions(options);
     graph.restrictions = restrictions;
     if (result->replayed) {
-      return RunGraphMatch(graph, ranking, ids, verifier, job.threads, on_progress);
+      return RunGraphMatch(graph, ranking, ids, budgeted, job.threads, on_progress);
     }
     const std::string key = LoopKey(options, graph);
     const std::vector<ImagePair> seeds =
         ChooseSeeds(graph, ranking, ids, verifier, job.threads, job.state.ReadSeeds(key));
     job.state.KeepSeeds(key, seeds);
-    return RunGraphMatch(graph, ranking, ids, verifier, job.threads, on_progress, seeds);
-  });
+    return RunGraphMatch(graph, ranking, ids, budgeted, job.threads, on_progress, seeds);
+  };
+  GraphMatchResult matching =
+      TestWithinBudget(job, verifier, OrderOfRanking(ranking, ids), result, test);
+  KeepDetails(job, verifier, &ranking, ids, record, result);
+  return matching;
 }
 
-void MatchWithColmap(const Job& job, const OnProgress& on_progress, PipelineResult* result) {
+// Fills the candidates of a dry run.
+void FindCandidates(const Job& job, PipelineResult* result) {
+  const PipelineOptions& options = job.options;
+  const std::vector<VerifiedPair> known = job.database.ReadVerifiedPairs(
+      static_cast<std::size_t>(options.verification.min_num_inliers));
+  const RankedImages ranked = Rank(job, known, result);
+  RetrievalOptions retrieval = MakeRetrievalOptions(options);
+  if (!RetrievesOnce(options.strategy)) {
+    retrieval.num_images = MakeGraphOptions(options).MaxTestsForSampling(ranked.images.size());
+  }
+  retrieval.restrictions = FindRestrictions(job, ranked.images);
+  for (const VertexPair& pair : RetrievePairs(retrieval, *ranked.ranking, job.threads)) {
+    const ImagePair images(ranked.images[pair.first].id, ranked.images[pair.second].id);
+    if (FindPair(known, images) != nullptr) continue;
+    result->candidates.push_back({images, ranked.ranking->Distance(pair.first, pair.second)});
+  }
+  std::sort(result->candidates.begin(), result->candidates.end(),
+            [](const CandidatePair& a, const CandidatePair& b) {
+              return std::tie(a.distance, a.pair) < std::tie(b.distance, b.pair);
+            });
+  result->num_candidates_per_image = static_cast<std::size_t>(retrieval.num_images);
+  result->images = job.all_images;
+}
+
+void MatchWithColmap(const Job& job, const OnProgress& on_progress, RunRecord* record,
+                     PipelineResult* result) {
   const PipelineOptions& options = job.options;
   const auto warn = [&](const std::string& warning) { job.observer.OnWarning(warning); };
   const WorkDirectory work(options.work_path, WorkDirectory::Guard::kGuarded);
@@ -213,7 +310,7 @@ void MatchWithColmap(const Job& job, const OnProgress& on_progress, PipelineResu
                       ", processes: " + std::to_string(verifier.NumProcesses()) +
                       ", threads in each: " + std::to_string(verifier.NumThreadsPerProcess()) +
                       ".");
-  result->matching = FindEdges(job, verifier, on_progress, result);
+  result->matching = FindEdges(job, verifier, on_progress, record, result);
   result->verification = verifier.Statistics();
 }
 
@@ -248,11 +345,12 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
   ThreadPool threads(options.num_threads);
   result.num_threads = threads.NumThreads();
 
+  const bool reads_only = result.replayed || options.dry_run;
   Database database(options.database_path,
-                    result.replayed ? sqlite::Access::kRead : sqlite::Access::kReadWrite,
+                    reads_only ? sqlite::Access::kRead : sqlite::Access::kReadWrite,
                     options.verification.lock_timeout);
   const std::vector<ImageRecord> all_images = database.ReadImages();
-  if (!result.replayed) database.CheckWritable();
+  if (!reads_only) database.CheckWritable();
   const auto info = [&](const std::string& message) { observer.OnInfo(message); };
   const auto warn = [&](const std::string& warning) { observer.OnWarning(warning); };
   // Nothing of a replay is for the next run on these photos.
@@ -273,7 +371,10 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
 
   std::optional<TestLog> log;
   if (!options.test_log_path.empty()) log.emplace(options.test_log_path, all_images);
-  Job job = {options, stop, observer, threads, database, state, all_images, images, {}, {}};
+  Job job = {
+      options, stop, observer, threads, database, state, all_images, images, {}, {}, [&total] {
+        return total.Seconds();
+      }};
   if (!options.match_list_path.empty()) {
     job.listed_pairs = ReadListedPairs(options.match_list_path, all_images, observer);
   }
@@ -282,22 +383,26 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
     WarnOfSkippedLines(list, options.image_list_path, "an image", observer);
     job.seeking = std::move(list.images);
   }
+  if (options.dry_run) {
+    FindCandidates(job, &result);
+    result.dry_run = true;
+    result.total_seconds = total.Seconds();
+    return result;
+  }
+  RunRecord record;
+  const auto on_progress = [&](const LoopProgress& progress) {
+    result.num_expected_tests_left = progress.expected_remaining_tests;
+    if (log) log->Write(progress, job.seconds());
+    if (options.keep_details) record.Add(progress, job.seconds());
+    observer.OnProgress(progress);
+  };
   if (result.replayed) {
     ReplayVerifier verifier = MakeReplayVerifier(job);
-    const auto on_progress = [&](const LoopProgress& progress) {
-      result.modelled_seconds = verifier.ModelledSeconds();
-      if (log) {
-        log->Write(progress, result.preprocessing_seconds.Sum() + result.modelled_seconds);
-      }
-      observer.OnProgress(progress);
-    };
-    result.matching = FindEdges(job, verifier, on_progress, &result);
+    job.seconds = [&] { return result.preprocessing_seconds.Sum() + verifier.ModelledSeconds(); };
+    result.matching = FindEdges(job, verifier, on_progress, &record, &result);
+    result.modelled_seconds = verifier.ModelledSeconds();
   } else {
-    const auto on_progress = [&](const LoopProgress& progress) {
-      if (log) log->Write(progress, total.Seconds());
-      observer.OnProgress(progress);
-    };
-    MatchWithColmap(job, on_progress, &result);
+    MatchWithColmap(job, on_progress, &record, &result);
   }
   if (log) log->Close();
   result.total_seconds = total.Seconds();

@@ -3,13 +3,16 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/graph/retrieval.h"
+#include "colmap_graphmatch/pipeline/budgeted_verifier.h"
 #include "colmap_graphmatch/pipeline/image_ranking.h"
 #include "colmap_graphmatch/pipeline/observer.h"
+#include "colmap_graphmatch/pipeline/run_record.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
 
@@ -57,6 +60,17 @@ struct PipelineOptions {
   int num_expansions = 4;
   ColmapVerifierOptions verification;
 
+  // What the run may spend; then it ends as if it had been stopped.
+  TestBudget budget;
+
+  // Ranks the images and tests nothing: the result has the candidates. COLMAP is not run, and
+  // nothing is written to the database.
+  bool dry_run = false;
+
+  // Whether the result has images, discovery, tested and images_without_edge, which reports and
+  // exports are made of: some 16 bytes for each tested pair.
+  bool keep_details = false;
+
   // Answers pairs from this finished matching graph (see finished_graph.h) instead of having COLMAP
   // verify them, unless it is empty. Nothing is written to the database, and what it knows of pairs
   // is not used.
@@ -70,7 +84,15 @@ struct PipelineOptions {
   void Check() const;
 };
 
+// Two images that look alike.
+struct CandidatePair {
+  ImagePair pair;
+  float distance = 0;  // Of the ranking.
+};
+
 struct PipelineResult {
+  enum class StoppedBy { kNothing, kRequest, kMaxPairs, kMaxMinutes };
+
   std::size_t num_images = 0;
   std::size_t num_images_without_features = 0;
   bool listed = false;  // The pairs were given, all or a list: no sampling, no propagation.
@@ -82,6 +104,22 @@ struct PipelineResult {
   double matching_seconds = 0;  // Of the loop or the list, with verification.
   double modelled_seconds = 0;  // What verification would have taken that was replayed.
   double total_seconds = 0;
+
+  StoppedBy stopped_by = StoppedBy::kNothing;
+  // Of a run that was stopped: about how many tests were to come (LoopProgress).
+  std::size_t num_expected_tests_left = 0;
+
+  // Of a dry run: the pairs that the strategy would draw for each image if none of them matched,
+  // but for those tested already; nearest first.
+  bool dry_run = false;
+  std::vector<CandidatePair> candidates;
+  std::size_t num_candidates_per_image = 0;
+
+  // With PipelineOptions::keep_details:
+  std::vector<ImageRecord> images;  // All, ascending by id; for candidates, too.
+  std::vector<DiscoveryPoint> discovery;
+  std::vector<VerifiedPair> tested;  // Those of earlier runs included; ascending.
+  std::vector<ImageWithoutEdge> images_without_edge;
 };
 
 // The whole job: from the features in the database to its two-view geometries. Throws the errors of

@@ -155,12 +155,7 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
                      (options.matcher == ColmapVerifierOptions::Matcher::kAuto && !gpu);
   options_.use_gpu = gpu && !exact;
   for (const ImageRecord& image : images) images_.emplace(image.id, image);
-  for (const TestedPair& tested : database.ReadTestedPairs()) {
-    const auto min_num_inliers = static_cast<std::size_t>(options.min_num_inliers);
-    const bool is_edge = IsEdge(tested.num_inliers, tested.config, min_num_inliers);
-    known_.push_back({tested.pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
-                      static_cast<std::uint32_t>(tested.num_inliers)});
-  }
+  known_ = database.ReadVerifiedPairs(static_cast<std::size_t>(options.min_num_inliers));
 
   const int num_threads = EffectiveNumThreads(options.num_threads);
   num_processes_ = options.num_processes > 0 ? options.num_processes

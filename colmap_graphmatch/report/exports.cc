@@ -1,0 +1,98 @@
+#include "colmap_graphmatch/report/exports.h"
+
+#include <algorithm>
+#include <boost/graph/adjacency_list.hpp>
+#include <boost/graph/graphml.hpp>
+#include <boost/graph/graphviz.hpp>
+#include <boost/property_map/dynamic_property_map.hpp>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/base/whole_file.h"
+#include "colmap_graphmatch/report/matching_graph_view.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+struct ImageProperties {
+  std::size_t image_id = 0;
+  std::string name;
+  std::size_t component = 0;  // 1: the largest; 0: the image has no edge.
+};
+
+struct EdgeProperties {
+  std::size_t inliers = 0;
+};
+
+using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS, ImageProperties,
+                                    EdgeProperties>;
+
+Graph MakeGraph(const PipelineResult& result) {
+  const std::vector<GraphEdge> edges = EdgesOf(result, ImageIndex(result.images));
+  Graph graph(result.images.size());
+  for (std::size_t i = 0; i < result.images.size(); ++i) {
+    graph[i] = {result.images[i].id, result.images[i].name, 0};
+  }
+  std::size_t number = 0;
+  for (const std::vector<std::size_t>& component : FindComponents(result.images.size(), edges)) {
+    ++number;
+    for (const std::size_t image : component) graph[image].component = number;
+  }
+  for (const GraphEdge& edge : edges) {
+    boost::add_edge(edge.a, edge.b, EdgeProperties{edge.num_inliers}, graph);
+  }
+  return graph;
+}
+
+// The pairs of a list, best first.
+std::vector<ImagePair> SortedPairs(const PipelineResult& result) {
+  std::vector<ImagePair> pairs;
+  if (result.dry_run) {
+    for (const CandidatePair& candidate : result.candidates) pairs.push_back(candidate.pair);
+    return pairs;
+  }
+  std::vector<VerifiedPair> edges;
+  std::copy_if(result.tested.begin(), result.tested.end(), std::back_inserter(edges),
+               [](const VerifiedPair& verified) { return verified.outcome == PairOutcome::kEdge; });
+  std::stable_sort(edges.begin(), edges.end(), [](const VerifiedPair& a, const VerifiedPair& b) {
+    return a.num_inliers > b.num_inliers;
+  });
+  for (const VerifiedPair& edge : edges) pairs.push_back(edge.pair);
+  return pairs;
+}
+
+}  // namespace
+
+bool WritePairList(const std::filesystem::path& path, const PipelineResult& result) {
+  const ImageIndex index(result.images);
+  bool any_spaces = false;
+  WriteWholeFile(path, [&](std::ostream& file) {
+    for (const ImagePair& pair : SortedPairs(result)) {
+      const std::string& name1 = result.images[index.Of(pair.id1)].name;
+      const std::string& name2 = result.images[index.Of(pair.id2)].name;
+      const bool spaces = (name1 + name2).find(' ') != std::string::npos;
+      any_spaces = any_spaces || spaces;
+      file << name1 << (spaces ? '\t' : ' ') << name2 << '\n';
+    }
+  });
+  return any_spaces;
+}
+
+void WriteGraph(const std::filesystem::path& path, const PipelineResult& result) {
+  Graph graph = MakeGraph(result);
+  boost::dynamic_properties properties;
+  properties.property("image_id", boost::get(&ImageProperties::image_id, graph));
+  properties.property("component", boost::get(&ImageProperties::component, graph));
+  properties.property("inliers", boost::get(&EdgeProperties::inliers, graph));
+  const bool is_dot = path.extension() == ".dot" || path.extension() == ".gv";
+  properties.property(is_dot ? "label" : "name", boost::get(&ImageProperties::name, graph));
+  WriteWholeFile(path, [&](std::ostream& file) {
+    if (is_dot) {
+      boost::write_graphviz_dp(file, graph, properties, "image_id");
+    } else {
+      boost::write_graphml(file, graph, properties, true);
+    }
+  });
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+
+#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+
+namespace colmap_graphmatch {
+
+// What a run found, for other programs (docs/formats.md). The results need details
+// (PipelineOptions::keep_details), or are those of a dry run. The functions throw FileError if the
+// file cannot be written; then what was there before is still there.
+
+// Two names a line, as COLMAP's matches_importer and hloc read them: the edges, those with the most
+// inliers first, or the candidates of a dry run, nearest first. A space between them, or a tab if
+// one of them has spaces; true if there are such names, which neither of those programs can read.
+bool WritePairList(const std::filesystem::path& path, const PipelineResult& result);
+
+// The matching graph: the images with their ids, names and components, the edges with their numbers
+// of inliers. GraphML, or the language of Graphviz if the path ends in .dot or .gv.
+void WriteGraph(const std::filesystem::path& path, const PipelineResult& result);
+
+}  // namespace colmap_graphmatch
