@@ -13,6 +13,7 @@
 #include "colmap_graphmatch/pipeline/finished_graph.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/pipeline/ranked_lists.h"
+#include "colmap_graphmatch/report/exports.h"
 #include "colmap_graphmatch/report/json_report.h"
 #include "tests/support/synthetic_database.h"
 
@@ -294,6 +295,134 @@ TEST_F(ReplayTest, TheReportSaysWhatWasFound) {
   EXPECT_EQ(num_tests, result.matching.graph.NumTested());
   EXPECT_THROW(WriteJsonReport(directory_.Path() / "none" / "report.json", options_, result),
                FileError);
+}
+
+TEST_F(ReplayTest, TheReportKnowsEveryImageAndPair) {
+  options_.keep_details = true;
+  // Another photo that shows none of the places, with a name that is not UTF-8.
+  std::vector<SyntheticImage> images = MakePlaces(6, 5, 40, 1);
+  images[3].name = "with \"quotes\", and a comma";
+  SyntheticImage stranger = MakePlaces(1, 1, 40, 77).front();
+  stranger.name =
+      "Stra\xdf"
+      "e.jpg";
+  images.push_back(stranger);
+  WriteSyntheticDatabase(options_.database_path, Schema::kColmap38, images);
+  const PipelineResult result = Run();
+  const nlohmann::json report = nlohmann::json::parse(MakeJsonReport(options_, result));
+  EXPECT_EQ(report["image_names"].size(), 31U);
+  EXPECT_EQ(report["image_names"][3], images[3].name);
+  EXPECT_EQ(report["image_ids"][30], 31);
+  EXPECT_EQ(report["connected_components"].size(), 6U);
+  EXPECT_EQ(report["edge_list"].size(), 60U);
+  EXPECT_EQ(report["edge_list"][0], nlohmann::json({0, 1, 20}));
+  EXPECT_EQ(report["nonedge_list"].size() / 2 + 60, result.matching.graph.NumTested());
+  EXPECT_EQ(report["num_bridges"], 0);
+  EXPECT_EQ(report["stopped_by"], nullptr);
+  ASSERT_EQ(report["images_without_edge"].size(), 1U);
+  const auto& alone = report["images_without_edge"][0];
+  EXPECT_EQ(alone["image"], 30);
+  EXPECT_EQ(alone["features"], 40);
+  ASSERT_EQ(alone["candidates"].size(), 5U);
+  EXPECT_LE(alone["candidates"][0]["distance"], alone["candidates"][1]["distance"]);
+  const auto& last = report["discovery"].back();
+  EXPECT_EQ(last["tests"], result.matching.All().num_tested);
+  EXPECT_EQ(last["edges"], 60);
+}
+
+TEST_F(ReplayTest, ABudgetEndsTheRun) {
+  options_.budget.max_pairs = 20;
+  const PipelineResult result = Run();
+  EXPECT_FALSE(result.matching.finished);
+  EXPECT_EQ(result.stopped_by, PipelineResult::StoppedBy::kMaxPairs);
+  EXPECT_EQ(result.matching.All().num_tested, 20U);
+  EXPECT_GT(result.num_expected_tests_left, 10U);
+  // The most promising first: nearly all are edges.
+  EXPECT_GE(result.matching.graph.NumEdges(), 18U);
+
+  options_.budget = {};
+  options_.budget.max_minutes = 1;
+  options_.replay_costs = {0, 2};
+  const PipelineResult timed = Run();
+  EXPECT_EQ(timed.stopped_by, PipelineResult::StoppedBy::kMaxMinutes);
+  EXPECT_LE(timed.modelled_seconds, 60);
+}
+
+TEST_F(ReplayTest, AListIsCutAtItsEnd) {
+  options_.match_list_path = directory_.Path() / "pairs.txt";
+  Database database(options_.database_path, sqlite::Access::kRead, 1);
+  const std::vector<ImageRecord> images = database.ReadImages();
+  std::ofstream(options_.match_list_path) << images[9].name << '\t' << images[8].name << "\n"
+                                          << images[0].name << '\t' << images[1].name << "\n"
+                                          << images[2].name << '\t' << images[1].name << "\n";
+  options_.budget.max_pairs = 1;
+  options_.keep_details = true;
+  const PipelineResult result = Run();
+  ASSERT_THAT(result.tested, SizeIs(1));
+  EXPECT_EQ(result.tested[0].pair, ImagePair(9, 10));
+}
+
+TEST_F(ReplayTest, ADryRunFindsCandidatesAndTestsNothing) {
+  options_.replay_path.clear();
+  options_.dry_run = true;
+  const PipelineResult result = Run();  // There is no COLMAP at options_.colmap_path.
+  EXPECT_EQ(result.matching.graph.NumTested(), 0U);
+  EXPECT_EQ(result.num_candidates_per_image, 10U);
+  ASSERT_GE(result.candidates.size(), 30U * 10 / 2);
+  EXPECT_TRUE(std::is_sorted(
+      result.candidates.begin(), result.candidates.end(),
+      [](const CandidatePair& a, const CandidatePair& b) { return a.distance < b.distance; }));
+  EXPECT_EQ((result.candidates[0].pair.id1 - 1) / 5, (result.candidates[0].pair.id2 - 1) / 5);
+  Database database(options_.database_path, sqlite::Access::kRead, 1);
+  EXPECT_THAT(database.ReadTestedPairs(), IsEmpty());
+
+  options_.strategy = PipelineOptions::Strategy::kRetrieval;
+  options_.num_retrieved_images = 3;
+  EXPECT_EQ(Run().num_candidates_per_image, 3U);
+  options_.strategy = PipelineOptions::Strategy::kExhaustive;
+  EXPECT_THROW(Run(), OptionsError);
+}
+
+TEST_F(ReplayTest, ExportsForOtherPrograms) {
+  options_.keep_details = true;
+  const PipelineResult result = Run();
+  const std::filesystem::path path = directory_.Path() / "out.txt";
+  EXPECT_TRUE(WritePairList(path, result));  // All names have spaces.
+  std::istringstream list(ReadFile(path));
+  std::string line;
+  std::size_t num_lines = 0;
+  std::size_t num_tabs = 0;
+  std::string first;
+  while (std::getline(list, line)) {
+    if (num_lines++ == 0) first = line;
+    num_tabs += line.find('\t') != std::string::npos ? 1 : 0;
+  }
+  EXPECT_EQ(num_lines, 60U);
+  EXPECT_EQ(num_tabs, 60U);
+  // In the truth of this test, the later images have the more inliers.
+  EXPECT_EQ(first, result.images[28].name + "\t" + result.images[29].name);
+
+  PipelineResult plain = result;
+  for (ImageRecord& image : plain.images) image.name = std::to_string(image.id) + ".jpg";
+  EXPECT_FALSE(WritePairList(path, plain));
+  EXPECT_EQ(ReadFile(path).rfind("29.jpg 30.jpg\n", 0), 0U);
+
+  WriteGraph(directory_.Path() / "graph.graphml", result);
+  const std::string graphml = ReadFile(directory_.Path() / "graph.graphml");
+  EXPECT_THAT(graphml, HasSubstr("with &quot;quotes&quot;, and a comma"));
+  const auto count = [](const std::string& text, const std::string& part) {
+    std::size_t num = 0;
+    for (std::size_t i = text.find(part); i != std::string::npos; i = text.find(part, i + 1)) ++num;
+    return num;
+  };
+  EXPECT_EQ(count(graphml, "<node "), 30U);
+  EXPECT_EQ(count(graphml, "<edge "), 60U);
+  WriteGraph(directory_.Path() / "graph.dot", result);
+  const std::string dot = ReadFile(directory_.Path() / "graph.dot");
+  EXPECT_THAT(dot, HasSubstr("label=\"with \\\"quotes\\\", and a comma\""));
+  EXPECT_EQ(count(dot, "--"), 60U);
+  EXPECT_THROW(WriteGraph(directory_.Path() / "none" / "graph.dot", result), FileError);
+  EXPECT_THROW(WritePairList(directory_.Path() / "none" / "pairs.txt", result), FileError);
 }
 
 TEST_F(ReplayTest, RankedListsTakeThePlaceOfVectors) {

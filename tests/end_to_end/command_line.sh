@@ -233,6 +233,42 @@ expect_exit 0 'Pairs tested       2 of 780' "$matcher" --database_path "$work/li
 grep -q '1 line(s) of .* skipped; the first is "place1/photo 3.jpg no/photo.jpg"' "$work/output.txt" ||
   fail "a line that names no pair was not mentioned"
 
+echo "== A budget of pairs: run after run, until nothing is left, the same as without one"
+cp "$work/untouched.db" "$work/budget.db"
+expect_exit 0 'Stopped            after max_pairs = 150; about' "$matcher" --database_path "$work/budget.db" \
+  --colmap_path "$fake" --GraphMatching.max_pairs 150
+[[ $(count_tested "$work/budget.db") == 150 ]] || fail "$(count_tested "$work/budget.db") pairs, not 150"
+for _ in 2 3; do
+  "$matcher" --database_path "$work/budget.db" --colmap_path "$fake" --GraphMatching.max_pairs 150 >"$work/output.txt" 2>&1
+done
+! grep -q '^Stopped' "$work/output.txt" || fail "the third run did not come to the end"
+tested_pairs "$work/budget.db" | cmp - "$work/undisturbed.txt"
+cp "$work/untouched.db" "$work/budget.db"
+# Pre-processing alone takes longer.
+expect_exit 0 'Stopped            by max_minutes = 1e-05' "$matcher" --database_path "$work/budget.db" \
+  --colmap_path "$fake" --GraphMatching.max_minutes 0.00001
+[[ $(count_tested "$work/budget.db") == 0 ]] || fail "pairs after the time was over"
+
+echo "== A dry run, and lists and graphs for other programs"
+cp "$work/untouched.db" "$work/dry.db"
+sha256sum "$work/dry.db" >"$work/dry.sum"
+expect_exit 0 'Candidates         ' "$matcher" --database_path "$work/dry.db" --colmap_path /nowhere \
+  --GraphMatching.dry_run 1 --GraphMatching.export_pairs "$work/candidates.txt"
+sha256sum --check --quiet "$work/dry.sum" || fail "a dry run wrote to the database"
+num=$(sed -n 's/^Candidates  *\([0-9]*\) pairs.*/\1/p' "$work/output.txt")
+[[ $(wc -l <"$work/candidates.txt") == "$num" ]] || fail "not $num candidates"
+expect_exit 0 "Pairs tested       $num of" "$matcher" --database_path "$work/dry.db" --colmap_path "$fake" \
+  --GraphMatching.match_list_path "$work/candidates.txt" --GraphMatching.export_pairs "$work/edges.txt" \
+  --GraphMatching.export_graph "$work/graph.dot" --GraphMatching.report "$work/report.json"
+[[ $(wc -l <"$work/edges.txt") == "$(tested_pairs "$work/dry.db" | grep -c '|1$')" ]] || fail "not all edges"
+[[ $(grep -c -e '--' "$work/graph.dot") == "$(wc -l <"$work/edges.txt")" ]] || fail "another graph"
+expect_exit 1 'must end in .graphml' "$matcher" --database_path "$work/dry.db" --colmap_path "$fake" \
+  --GraphMatching.export_graph "$work/graph.png"
+expect_exit 1 'With --GraphMatching.dry_run nothing is tested' "$matcher" --database_path "$work/dry.db" \
+  --GraphMatching.dry_run 1 --GraphMatching.report "$work/report.json"
+expect_exit 5 'Cannot write' "$matcher" --database_path "$work/dry.db" --colmap_path "$fake" \
+  --GraphMatching.export_pairs "$work/none/pairs.txt"
+
 echo "== One pair that COLMAP crashes on"
 cp "$work/untouched.db" "$work/crash.db"
 FAKE_COLMAP_FAULT=crash FAKE_COLMAP_FAULT_PAIR='1 2' \
@@ -251,7 +287,8 @@ cp "$work/untouched.db" "$work/early.db"
 FAKE_COLMAP_HELP_DELAY_MS=5000 "$matcher" --database_path "$work/early.db" --colmap_path "$fake" \
   >"$work/early.txt" 2>&1 &
 pid=$!
-sleep 0.5
+# When it has started COLMAP, it listens to signals.
+until pgrep --parent "$pid" >/dev/null; do sleep 0.05; done
 kill -INT "$pid"
 code=0
 wait "$pid" || code=$?
