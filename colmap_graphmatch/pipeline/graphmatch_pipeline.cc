@@ -198,7 +198,7 @@ GraphMatchResult TestWithinBudget(const Job& job, PairVerifier& verifier,
                                   const Test& test) {
   BudgetedVerifier budgeted(verifier, job.options.budget, job.threads.NumThreads(), job.seconds,
                             order);
-  const GraphMatchResult matching =
+  GraphMatchResult matching =
       Timed(&result->matching_seconds, [&]() -> GraphMatchResult { return test(budgeted); });
   if (!matching.finished) {
     using Limit = BudgetedVerifier::Limit;

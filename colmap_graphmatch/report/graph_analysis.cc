@@ -202,6 +202,7 @@ std::vector<WeakLink> FindWeakLinks(std::size_t num_vertices, const std::vector<
     link.edges.push_back(i);
   }
   std::vector<WeakLink> result;
+  result.reserve(links.size());
   for (auto& [labels_of_groups, link] : links) result.push_back(std::move(link));
   std::stable_sort(result.begin(), result.end(), [](const WeakLink& a, const WeakLink& b) {
     return std::make_pair(a.groups[1], a.groups[0]) > std::make_pair(b.groups[1], b.groups[0]);
