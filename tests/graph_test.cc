@@ -294,6 +294,30 @@ TEST(Propagation, FullVerticesAreReachedFromOthersOnly) {
   EXPECT_THAT(Propagate(options, ranking, graph, 0, threads), ElementsAre(VertexPair(0, 2)));
 }
 
+TEST(Propagation, CountsWhatItCouldProposeWithoutALimit) {
+  const Scene scene = MakeScene(3, 20, 6, 0.5, 4);
+  const VectorRanking ranking = MakeRanking(scene);
+  ThreadPool threads(2);
+  MatchingGraph graph(scene.num_vertices);
+  std::vector<TestedVertexPair> pairs;
+  for (const VertexPair& edge : scene.edges) {
+    if ((edge.first + edge.second) % 3 != 0) pairs.push_back({edge, edge.second % 4 != 0});
+  }
+  graph.Add(pairs);
+  GraphMatchOptions options;
+  options.num_to_propagate = static_cast<int>(scene.num_vertices);
+  for (std::size_t v = 0; v < scene.num_vertices; ++v) {
+    options.restrictions.seeking.push_back(v % 5 != 0);
+    options.restrictions.frames.push_back(static_cast<std::uint32_t>(v / 2));
+  }
+  for (const int max_num_neighbors : {6, 120}) {
+    options.max_num_neighbors = max_num_neighbors;
+    const std::vector<VertexPair> open = Propagate(options, ranking, graph, 0, threads);
+    EXPECT_GT(open.size(), 20U);
+    EXPECT_EQ(CountOpenPairs(options, graph, threads), open.size());
+  }
+}
+
 struct NamedOptions {
   std::string name;
   GraphMatchOptions options;
@@ -844,6 +868,25 @@ TEST(Loop, ProgressGrowsAndEndsAtTheResult) {
   EXPECT_EQ(last.num_edges, result.graph.NumEdges());
   EXPECT_EQ(last.num_components, result.num_components);
   EXPECT_EQ(last.num_isolated, result.num_isolated);
+}
+
+TEST(Loop, ExpectsAboutAsManyTestsAsCome) {
+  const Scene scene = MakeScene(12, 25, 8, 0.5, 15);
+  const VectorRanking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  ThreadPool threads(2);
+  std::vector<std::size_t> expected;
+  RunGraphMatch(
+      GraphMatchOptions(), ranking, ids, verifier, threads,
+      [&](const LoopProgress& progress) { expected.push_back(progress.expected_remaining_tests); });
+  ASSERT_GT(expected.size(), 2000U);
+  for (std::size_t i = expected.size() / 5; i < expected.size(); ++i) {
+    const std::size_t to_come = expected.size() - i - 1;
+    EXPECT_NEAR(static_cast<double>(expected[i]), static_cast<double>(to_come),
+                0.35 * static_cast<double>(to_come) + 30);
+  }
+  EXPECT_EQ(expected.back(), 0U);
 }
 
 TEST(Loop, NeedsAnIdForEveryImage) {

@@ -1,5 +1,6 @@
 #include "colmap_graphmatch/graph/graphmatch.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -10,6 +11,14 @@
 namespace colmap_graphmatch {
 namespace {
 
+// Of pairs that were asked for, earlier runs' included; `without_pairs` if there were none.
+double EdgesPerPair(const StageStatistics& stage, double without_pairs) {
+  const std::size_t num_pairs = stage.num_tested + stage.num_known;
+  if (num_pairs == 0) return without_pairs;
+  return static_cast<double>(stage.num_edges + stage.num_known_edges) /
+         static_cast<double>(num_pairs);
+}
+
 class Loop {
  public:
   Loop(const GraphMatchOptions& options, const Ranking& ranking,
@@ -19,7 +28,8 @@ class Loop {
         ranking_(ranking),
         threads_(threads),
         sampler_(options, ranking, threads),
-        builder_(image_ids, verifier, on_progress) {}
+        builder_(image_ids, verifier, on_progress),
+        shows_progress_(static_cast<bool>(on_progress)) {}
 
   // Makes known pairs part of the graph.
   void Begin(const std::vector<ImagePair>& seeds) {
@@ -52,11 +62,13 @@ class Loop {
     if (sampling_over_) return false;
     const std::vector<VertexPair> pairs = sampler_.Propose(iteration_, builder_.Graph());
     sampler_.Charge();
-    const StageStatistics found =
-        builder_.Verify(LoopStage::kSampling, iteration_, pairs, ExpectedTestsAfterThisBatch());
-    iterations_.back().sampling = found;
-    sampling_over_ =
-        options_.stop_sampling_without_edges && found.num_edges + found.num_known_edges == 0;
+    // Of the draws to come ever fewer coincide.
+    sampling_batch_ = static_cast<double>(pairs.size() + sampler_.NumDrawn()) / 2;
+    last_sampling_ =
+        builder_.Verify(LoopStage::kSampling, iteration_, pairs, ExpectedTestsAfter(0));
+    iterations_.back().sampling = last_sampling_;
+    sampling_over_ = options_.stop_sampling_without_edges &&
+                     last_sampling_.num_edges + last_sampling_.num_known_edges == 0;
     return !pairs.empty();
   }
 
@@ -65,8 +77,9 @@ class Loop {
         options_, ranking_, builder_.Graph(),
         options_.propagate_from_new_edges_only ? first_new_edge_ : 0, threads_);
     first_new_edge_ = builder_.Graph().NumEdges();
-    iterations_.back().propagation =
-        builder_.Verify(LoopStage::kPropagation, iteration_, pairs, ExpectedTestsAfterThisBatch());
+    last_propagation_ = builder_.Verify(LoopStage::kPropagation, iteration_, pairs,
+                                        ExpectedTestsAfter(pairs.size()));
+    iterations_.back().propagation = last_propagation_;
     return !pairs.empty();
   }
 
@@ -81,20 +94,24 @@ class Loop {
     return true;
   }
 
-  // As many in each iteration to come as in the last whole one. They shrink, so this is rather too
-  // much.
-  double ExpectedTestsAfterThisBatch() const {
-    const int num_iterations = options_.number_sample_iterations - iteration_ - 1;
-    if (num_iterations <= 0 || sampling_over_) return 0;
-    if (iterations_.size() < 2) {
-      // Two images often draw each other; propagation tests about as much as sampling.
-      return 1.6 * num_iterations * static_cast<double>(ranking_.NumVertices()) *
-             options_.TestsInIteration(iteration_, ranking_.NumVertices());
-    }
-    const IterationStatistics& last = iterations_[iterations_.size() - 2];
-    const StageStatistics all = last.sampling + last.propagation;
-    return static_cast<double>(num_iterations) *
-           static_cast<double>(all.num_tested + all.num_known + all.num_failed);
+  // After the batch that is tested next; num_propagated: its pairs, if propagation proposed them.
+  double ExpectedTestsAfter(std::size_t num_propagated) const {
+    if (!shows_progress_) return 0;
+    const int num_iterations =
+        sampling_over_ ? 0 : std::max(options_.number_sample_iterations - iteration_ - 1, 0);
+    const double sampling = num_iterations * sampling_batch_;
+    if (options_.num_to_propagate == 0) return sampling;
+    // In the end propagation tests every open pair of today, and each edge among them opens about
+    // one more; edges are as frequent as they were last. To begin with there are hardly any open
+    // pairs: each edge that sampling is still to find leads to a test at least, up to a share.
+    constexpr double kLeastPropagation = 0.6;
+    const double share =
+        std::min(EdgesPerPair(last_sampling_, kLeastPropagation), kLeastPropagation);
+    const double edges_per_pair = EdgesPerPair(last_sampling_ + last_propagation_, 0);
+    const auto num_open = static_cast<double>(CountOpenPairs(options_, builder_.Graph(), threads_));
+    const double propagation = std::max(
+        num_open * (1 + edges_per_pair) - static_cast<double>(num_propagated), share * sampling);
+    return sampling + propagation;
   }
 
   const GraphMatchOptions& options_;
@@ -102,7 +119,11 @@ class Loop {
   ThreadPool& threads_;
   Sampler sampler_;
   GraphBuilder builder_;
+  bool shows_progress_;
   std::vector<IterationStatistics> iterations_;
+  StageStatistics last_sampling_;
+  StageStatistics last_propagation_;
+  double sampling_batch_ = 0;  // Expected tests of each sampling to come.
   bool sampling_over_ = false;
   std::size_t first_new_edge_ = 0;
   int iteration_ = 0;

@@ -50,8 +50,9 @@ struct LoopProgress {
   std::size_t num_components = 0;
   std::size_t largest_component = 0;
   std::size_t num_isolated = 0;
-  // An estimate of the tests to come, from the budgets and the tests that propagation needed so far
-  // for each one by sampling.
+  // An estimate of the tests to come. In the loop: sampling goes on at its pace, and propagation
+  // tests what it could propose now and what the edges among that lead to (docs/benchmarks.md says
+  // how good it is).
   std::size_t expected_remaining_tests = 0;
 };
 

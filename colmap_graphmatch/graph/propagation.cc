@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace colmap_graphmatch {
@@ -109,6 +110,39 @@ std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Rankin
     }
   });
   return UniteProposals(proposals);
+}
+
+std::size_t CountOpenPairs(const GraphMatchOptions& options, const MatchingGraph& graph,
+                           ThreadPool& threads) {
+  const auto looks_for_more = [&](Vertex a) {
+    return options.restrictions.Seeks(a) &&
+           graph.Degree(a) < static_cast<std::size_t>(options.max_num_neighbors);
+  };
+  const std::size_t num_vertices = graph.NumVertices();
+  const std::size_t num_tasks = (num_vertices + kVerticesPerTask - 1) / kVerticesPerTask;
+  std::vector<std::size_t> counts(num_tasks);
+  threads.ParallelFor(num_tasks, [&](std::size_t task) {
+    std::vector<Vertex> seen_from(num_vertices, kNoVertex);
+    const std::size_t end = std::min((task + 1) * kVerticesPerTask, num_vertices);
+    for (std::size_t i = task * kVerticesPerTask; i < end; ++i) {
+      const auto a = static_cast<Vertex>(i);
+      if (!looks_for_more(a)) continue;
+      seen_from[a] = a;
+      for (const Vertex b : graph.Neighbors(a)) {
+        for (const Vertex c : graph.Neighbors(b)) {
+          if (seen_from[c] == a) continue;
+          seen_from[c] = a;
+          // Of two vertices that look for more the smaller counts their pair.
+          if ((c < a && looks_for_more(c)) || graph.IsTested(a, c) ||
+              options.restrictions.SameFrame(a, c)) {
+            continue;
+          }
+          ++counts[task];
+        }
+      }
+    }
+  });
+  return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
 }
 
 }  // namespace colmap_graphmatch

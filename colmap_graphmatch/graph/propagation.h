@@ -18,4 +18,9 @@ std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Rankin
                                   const MatchingGraph& graph, std::size_t first_edge,
                                   ThreadPool& threads);
 
+// The untested pairs that propagation could propose along all edges if num_to_propagate were no
+// limit.
+std::size_t CountOpenPairs(const GraphMatchOptions& options, const MatchingGraph& graph,
+                           ThreadPool& threads);
+
 }  // namespace colmap_graphmatch

@@ -96,6 +96,12 @@ std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& gra
   return pairs;
 }
 
+std::size_t Sampler::NumDrawn() const {
+  std::size_t num_drawn = 0;
+  for (const std::vector<Vertex>& drawn : drawn_) num_drawn += drawn.size();
+  return num_drawn;
+}
+
 bool Sampler::HasAdvanced() const {
   return std::any_of(num_places_.begin(), num_places_.end(),
                      [](std::size_t num_places) { return num_places > 0; });

@@ -20,6 +20,10 @@ class Sampler {
   // pairs are those of the graph as it is now. Does not spend any budget.
   std::vector<VertexPair> Propose(int iteration, const MatchingGraph& graph);
 
+  // The pairs that the vertices drew in the last proposal: more than it has, as two may draw each
+  // other.
+  std::size_t NumDrawn() const;
+
   // Whether any vertex went on in its list with the last proposal (without sample_untested_only).
   bool HasAdvanced() const;
 
