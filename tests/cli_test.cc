@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
 #include <set>
 #include <string>
@@ -9,6 +10,7 @@
 #include "colmap_graphmatch/cli/console.h"
 #include "colmap_graphmatch/cli/option_table.h"
 #include "colmap_graphmatch/cli/options.h"
+#include "colmap_graphmatch/cli/progress.h"
 #include "tests/support/synthetic_database.h"
 
 namespace colmap_graphmatch {
@@ -146,11 +148,11 @@ TEST(Options, AnEmptyListOfImagesIsNone) {
 TEST(Options, WithoutMeaningAreSaidOnce) {
   const CommandLine line =
       Parse({"--VocabTreeMatching.vocab_tree_path", "tree.bin", "--VocabTreeMatching.num_checks",
-             "64", "--log_level", "0", "--log_level", "0"});
+             "64", "--VocabTreeMatching.num_checks", "64"});
   EXPECT_THAT(
       line.unused_options,
       ElementsAre(HasSubstr("--VocabTreeMatching.vocab_tree_path has no effect here: there is"),
-                  HasSubstr("num_checks"), HasSubstr("log_level")));
+                  HasSubstr("num_checks")));
 }
 
 TEST(Options, SeedsReachColmapToo) {
@@ -203,9 +205,126 @@ TEST(Options, ErrorsNameTheOptionAsItWasGiven) {
   EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("\"stray\" on the command line belongs to no option"));
 }
 
+TEST(Options, OfTheLogAreColmaps) {
+  LogOptions log = Parse({}).log;
+  EXPECT_EQ(log.target, LogOptions::Target::kStderrAndFile);
+  EXPECT_EQ(log.path, "");
+  EXPECT_EQ(log.severity, 0);
+  EXPECT_EQ(log.verbosity, 0);
+  EXPECT_TRUE(log.color);
+  EXPECT_FALSE(log.quiet);
+  log = Parse({"--log_severity", "1", "--log_level", "2", "--log_target", "stderr", "--log_color",
+               "0", "--GraphMatching.quiet", "1"})
+            .log;
+  EXPECT_EQ(log.target, LogOptions::Target::kStderr);
+  EXPECT_EQ(log.severity, 1);
+  EXPECT_EQ(log.verbosity, 2);
+  EXPECT_FALSE(log.color);
+  EXPECT_TRUE(log.quiet);
+  EXPECT_THAT(ErrorOf({"--log_severity", "4"}), HasSubstr("an integer from 0 to 3"));
+  EXPECT_THAT(ErrorOf({"--log_target", "printer"}), HasSubstr("one of file, stderr"));
+}
+
+TEST(Options, TheLogGoesToAFileThatIsNamed) {
+  EXPECT_EQ(Parse({"--log_target", "file", "--log_path", "a.log"}).log.target,
+            LogOptions::Target::kFile);
+  EXPECT_THAT(ErrorOf({"--log_target", "file"}), HasSubstr("needs --log_path"));
+  // What COLMAP 3.8 and COLMAP 4 write into their project files must not silence it.
+  EXPECT_EQ(Parse({"--log_to_stderr", "false"}).log.target, LogOptions::Target::kStderrAndFile);
+  EXPECT_EQ(Parse({"--log_target", "stderr_and_file", "--log_path", ""}).log.path, "");
+  EXPECT_EQ(Parse({"--log_to_stderr", "0", "--log_path", "a.log"}).log.target,
+            LogOptions::Target::kFile);
+}
+
+TEST(RecentRate, IsThatOfTheLastHalfMinuteOrSo) {
+  RecentRate rate;
+  EXPECT_EQ(rate.At(0), 0);
+  // What ends right after the beginning was begun before it.
+  rate.Update(100, 64);
+  rate.Update(100.4, 128);
+  EXPECT_EQ(rate.At(101), 0);
+  for (int i = 1; i <= 200; ++i) rate.Update(100.4 + i, 128 + 50 * static_cast<std::size_t>(i));
+  EXPECT_NEAR(rate.At(300.4), 50, 1e-6);
+  for (int i = 1; i <= 30; ++i) rate.Update(300.4 + i, 10128 + 10 * static_cast<std::size_t>(i));
+  // 1 / e of what is older than the window.
+  EXPECT_NEAR(rate.At(330.4), 10 + 40 * std::exp(-1), 0.1);
+  for (int i = 31; i <= 300; ++i) rate.Update(300.4 + i, 10128 + 10 * static_cast<std::size_t>(i));
+  EXPECT_NEAR(rate.At(600.4), 10, 0.01);
+  // Nothing comes any more.
+  EXPECT_NEAR(rate.At(630.4), 10 * std::exp(-1), 0.1);
+}
+
+ProgressView MakeView(std::size_t scale) {
+  ProgressView view;
+  view.loop.stage = LoopStage::kPropagation;
+  view.loop.iteration = 2;
+  view.loop.all.num_tested = 3 * scale;
+  view.loop.all.num_edges = scale;
+  view.loop.num_edges = scale + 7;
+  view.loop.num_components = scale / 5;
+  view.loop.largest_component = scale / 3;
+  view.loop.num_isolated = scale / 4;
+  view.loop.expected_remaining_tests = scale;
+  view.num_tested_now = 4;
+  view.num_edges_now = 1;
+  view.rate = static_cast<double>(scale) / 100;
+  view.seconds = static_cast<double>(scale);
+  return view;
+}
+
+TEST(Block, AsItIsAtEightyColumns) {
+  EXPECT_THAT(FormatBlock(MakeView(1200), 79),
+              ElementsAre("propagation 3 [===========================>         ] 75 %   about "
+                          "1.7 min left",
+                          "3,600 pairs tested   12.0 pairs/s   1,207 edges",
+                          "efficiency 0.25 now, 0.33 overall   240 components   largest 400 images",
+                          "300 images alone"));
+}
+
+TEST(Block, FitsEveryWidthWithEveryField) {
+  for (const std::size_t scale : {0, 1, 1200, 20000000}) {
+    for (std::size_t width = 59; width <= 200; ++width) {
+      const std::vector<std::string> lines = FormatBlock(MakeView(scale), width);
+      EXPECT_GE(lines.size(), 2U) << width;
+      EXPECT_LE(lines.size(), scale > 2000000 ? 5U : 4U) << width;
+      std::string all;
+      for (const std::string& line : lines) {
+        EXPECT_LE(line.size(), width) << line;
+        all += line + "   ";
+      }
+      for (const char* field : {"propagation 3 [", " %   ", " left", " pairs tested   ", " pairs/s",
+                                " edges   ", "efficiency 0.25 now, ", " overall   ",
+                                " components   largest ", " images   ", " images alone   "}) {
+        if (scale == 0 && field == std::string(" left")) continue;
+        EXPECT_THAT(all, HasSubstr(field)) << width;
+      }
+    }
+  }
+}
+
+TEST(Block, SaysWhatIsNotKnownYet) {
+  ProgressView view;
+  view.loop.stage = LoopStage::kListed;
+  const std::vector<std::string> lines = FormatBlock(view, 200);
+  EXPECT_THAT(lines[0], HasSubstr("matching [>"));
+  EXPECT_THAT(lines[0], HasSubstr("time left: not known yet"));
+  EXPECT_THAT(lines[1], HasSubstr("- pairs/s"));
+  EXPECT_THAT(lines[1], HasSubstr("efficiency - now, - overall"));
+}
+
+TEST(Block, ALogHasItInOneLine) {
+  EXPECT_EQ(FormatProgress(MakeView(1200)),
+            "propagation 3: 3600 pairs tested (75 %), 12.0 pairs/s, about 1.7 min left; 1207 "
+            "edges, efficiency 0.25 now, 0.33 overall; 240 components, largest 400 images, 300 "
+            "images alone");
+}
+
 TEST(Console, NamesGiveNoOrdersToTheTerminal) {
   EXPECT_EQ(WithoutControlCharacters("a \"\x1b[2J\x07\x7f\r\" b\n\tc \xc3\xa9"),
             "a \"?[2J???\" b\n\tc \xc3\xa9");
+  EXPECT_EQ(WithoutControlCharacters("\xc2\x9b"
+                                     "2J \xc2\xa9 \xc2"),
+            "?2J \xc2\xa9 \xc2");
 }
 
 class ProjectTest : public ::testing::Test {
@@ -237,10 +356,9 @@ TEST_F(ProjectTest, TheCommandLineGoesBeforeInAnySpelling) {
 }
 
 TEST_F(ProjectTest, DefaultsWithoutMeaningAreNotMentioned) {
-  EXPECT_THAT(
-      Parse(Project("log_to_stderr=false\nlog_level=2\n[VocabTreeMatching]\nnum_checks=64\n"))
-          .unused_options,
-      IsEmpty());
+  EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_checks=64\nnum_nearest_neighbors=5\n"))
+                  .unused_options,
+              IsEmpty());
   EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_checks=65\n")).unused_options,
               ElementsAre(HasSubstr("num_checks")));
 }

@@ -1,24 +1,62 @@
 #include "colmap_graphmatch/cli/console.h"
 
 #include <fmt/format.h>
+#include <spdlog/details/null_mutex.h>
+#include <spdlog/logger.h>
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/sinks/basic_file_sink.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
 #include <utility>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
 
 namespace colmap_graphmatch {
 namespace {
 
-constexpr std::chrono::milliseconds kTerminalInterval(100);
-constexpr std::chrono::seconds kLogInterval(10);
+constexpr std::chrono::milliseconds kFrame(100);
+constexpr double kLongestFrame = 0.5;  // Seconds: the time goes on even if nothing else does.
+constexpr double kLogInterval = 10;    // Seconds.
+constexpr char kPattern[] = "%^%L%$%Y%m%d %T.%f %P graphmatch_matcher] %v";
 
-std::size_t TerminalWidth(int descriptor) {
+// Clears the line and all below it. Not in one: tmux takes what is cleared from its first line on
+// to its end for a page that is worth keeping.
+constexpr char kClear[] = "\033[2K\033[C\033[J\r";
+
+struct TerminalSize {
+  std::size_t columns = 80;
+  std::size_t rows = 24;
+};
+
+TerminalSize SizeOf(int descriptor) {
   struct winsize size = {};
-  if (::ioctl(descriptor, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
-  return size.ws_col;
+  TerminalSize found;
+  if (::ioctl(descriptor, TIOCGWINSZ, &size) != 0) return found;
+  if (size.ws_col > 0) found.columns = size.ws_col;
+  if (size.ws_row > 0) found.rows = size.ws_row;
+  return found;
+}
+
+bool IsSet(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value != nullptr && *value != '\0';
+}
+
+// With the title bold and what is done green.
+std::string Colored(std::string first_line) {
+  const std::size_t bar = first_line.find(" [");
+  if (bar == std::string::npos) return first_line;
+  const std::size_t done_end = first_line.find_first_not_of("=>", bar + 2);
+  return fmt::format("\033[1m{}\033[0m [\033[32m{}\033[0m{}", first_line.substr(0, bar),
+                     first_line.substr(bar + 2, done_end - bar - 2), first_line.substr(done_end));
 }
 
 double Share(std::size_t part, double whole) {
@@ -100,51 +138,250 @@ std::string FormatStoppedBy(const PipelineOptions& options, const PipelineResult
 
 }  // namespace
 
-Console::Console(std::FILE* stream)
-    : stream_(stream), is_terminal_(::isatty(::fileno(stream)) == 1) {}
+// The lines of the log and, below them, the block, which is rewritten in place. Everything that
+// changes the screen is one write.
+class Console::TerminalSink : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+ public:
+  TerminalSink(std::FILE* stream, bool has_color)
+      : base_sink(std::make_unique<spdlog::pattern_formatter>(
+            kPattern, spdlog::pattern_time_type::local, "\n")),
+        stream_(stream),
+        has_color_(has_color) {}
 
-Console::~Console() { ClearProgress(); }
+  // Shows this instead of what is shown. One column is left free: a full line would wrap on some
+  // terminals.
+  void ShowBlock(const ProgressView& view) {
+    const TerminalSize size = SizeOf(::fileno(stream_));
+    std::string back = Back(size);
+    // A terminal keeps which of its rows are one wrapped line, and what is overwritten in place
+    // would be joined again when it becomes wider.
+    if (size.columns != columns_) back += kClear;
+    columns_ = size.columns;
+    block_ = FormatBlock(view, size.columns - 1);
+    block_.resize(std::min(block_.size(), size.rows - 1));
+    Write(back + Block());
+  }
 
-void Console::Print(const std::string& text) {
-  std::fputs(text.c_str(), stream_);
-  std::fflush(stream_);
+  void EraseBlock() {
+    if (block_.empty()) return;
+    const std::string back = Back(SizeOf(::fileno(stream_)));
+    block_.clear();
+    Write(back + kClear);
+  }
+
+  // The block that is shown belongs to what was written before.
+  void LeaveBlock() { block_.clear(); }
+
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::memory_buf_t formatted;
+    formatter_->format(message, formatted);
+    std::string line = fmt::to_string(formatted);
+    if (has_color_ && message.level >= spdlog::level::warn) {
+      const char* color = message.level == spdlog::level::warn ? "\033[33m" : "\033[31m";
+      line.insert(message.color_range_end, "\033[0m");
+      line.insert(message.color_range_start, color);
+    }
+    if (block_.empty()) {
+      Write(line);
+      return;
+    }
+    Write(Back(SizeOf(::fileno(stream_))) + kClear + line + Block());
+  }
+
+  void flush_() override {}
+
+ private:
+  // To the first column of the block. Lines that are longer than the terminal is wide by now have
+  // been wrapped.
+  std::string Back(const TerminalSize& size) const {
+    std::size_t num_rows = 0;
+    for (const std::string& line : block_) {
+      num_rows += std::max<std::size_t>((line.size() + size.columns - 1) / size.columns, 1);
+    }
+    return num_rows == 0 ? "\r" : fmt::format("\r\033[{}A", num_rows);
+  }
+
+  // The cursor is left below it, where Ctrl-C shows its ^C. Nothing is wrapped (?7l): if the
+  // terminal is narrower by now than it says, the block has as many rows all the same as Back()
+  // counts.
+  std::string Block() const {
+    std::string text = "\033[?7l";
+    for (const std::string& line : block_) {
+      const bool is_first = &line == &block_.front();
+      text += (has_color_ && is_first ? Colored(line) : line) + "\033[K\n";
+    }
+    return text + "\033[J\033[?7h";
+  }
+
+  void Write(const std::string& text) {
+    std::fwrite(text.data(), 1, text.size(), stream_);
+    std::fflush(stream_);
+  }
+
+  std::FILE* stream_;
+  bool has_color_;
+  std::vector<std::string> block_;  // As it is shown, without colours.
+  std::size_t columns_ = 0;         // Of the terminal when it was drawn.
+};
+
+namespace {
+
+spdlog::level::level_enum LevelOf(const LogOptions& options) {
+  const int severity = std::max(options.severity, options.quiet ? 1 : 0);
+  if (severity == 0) return spdlog::level::info;
+  return severity == 1 ? spdlog::level::warn : spdlog::level::err;
 }
 
-void Console::ClearProgress() {
-  if (showing_progress_) Print("\n");
-  showing_progress_ = false;
+std::unique_ptr<spdlog::logger> MakeFileLog(std::filesystem::path path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) path /= "graphmatch_matcher.log";
+  if (!std::ofstream(path, std::ios::app)) {
+    throw FileError("Cannot write the log " + path.string() + ": " + std::strerror(errno) + ".");
+  }
+  auto sink = std::make_shared<spdlog::sinks::basic_file_sink_st>(path.string());
+  auto log = std::make_unique<spdlog::logger>("file", std::move(sink));
+  log->set_pattern(kPattern);
+  log->flush_on(spdlog::level::info);
+  return log;
+}
+
+}  // namespace
+
+Console::Console(const LogOptions& options)
+    : options_(options), stream_(options.target == LogOptions::Target::kStdout ? stdout : stderr) {
+  const int descriptor = ::fileno(stream_);
+  const char* terminal = std::getenv("TERM");
+  const bool is_terminal =
+      ::isatty(descriptor) == 1 && terminal != nullptr && std::strcmp(terminal, "dumb") != 0;
+  has_color_ = is_terminal && options.color && !IsSet("NO_COLOR");
+  const bool only_file = options.target == LogOptions::Target::kFile;
+  has_block_ = is_terminal && !options.quiet && !only_file;
+  sink_ = std::make_shared<TerminalSink>(stream_, has_color_);
+  terminal_log_ = std::make_unique<spdlog::logger>("terminal", sink_);
+  terminal_log_->set_level(only_file ? spdlog::level::err : LevelOf(options));
+  const bool has_file = only_file || options.target == LogOptions::Target::kStderrAndFile;
+  if (has_file && !options.path.empty()) {
+    file_log_ = MakeFileLog(options.path);
+    file_log_->set_level(LevelOf(options));
+  }
+  watcher_ = std::thread([this] { Watch(); });
+}
+
+Console::~Console() {
+  EndProgress();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ends_ = true;
+  }
+  ended_.notify_one();
+  watcher_.join();
 }
 
 void Console::OnInfo(const std::string& message) {
-  ClearProgress();
-  Print(WithoutControlCharacters(message) + "\n");
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Log(spdlog::level::info, message);
 }
 
 void Console::OnWarning(const std::string& message) {
-  ClearProgress();
-  Print("Warning: " + WithoutControlCharacters(message) + "\n");
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Log(spdlog::level::warn, message);
+}
+
+void Console::Error(const std::string& message) {
+  EndProgress();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Log(spdlog::level::err, message);
 }
 
 void Console::OnProgress(const LoopProgress& progress) {
-  const Clock::time_point now = Clock::now();
-  if (!matching_) {
-    matching_ = true;
-    start_of_matching_ = now;
-    last_progress_ = now;
-    return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool is_first = !has_progress_;
+  if (is_first) start_ = Clock::now();
+  if (!is_first &&
+      (progress.stage != progress_.stage || progress.iteration != progress_.iteration)) {
+    LogStage();
+    before_stage_ = progress_.all;
   }
-  const Clock::duration interval = is_terminal_ ? Clock::duration(kTerminalInterval) : kLogInterval;
-  if (now - last_progress_ < interval) return;
-  last_progress_ = now;
-  const std::string line =
-      FormatProgress(progress, std::chrono::duration<double>(now - start_of_matching_).count());
-  if (is_terminal_) {
-    // One column is left free: a full line would wrap on some terminals.
-    Print("\r\033[K" + line.substr(0, TerminalWidth(::fileno(stream_)) - 1));
-    showing_progress_ = true;
-  } else {
-    Print(line + "\n");
+  has_progress_ = true;
+  progress_ = progress;
+  is_drawn_current_ = false;
+  const double seconds = Seconds();
+  rate_.Update(seconds, progress.all.num_tested);
+  if (is_first) Draw(seconds);
+}
+
+void Console::EndProgress() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (has_progress_) LogStage();
+  has_progress_ = false;
+  sink_->EraseBlock();
+}
+
+void Console::Log(int level, const std::string& message, bool on_terminal) {
+  const std::string text = WithoutControlCharacters(message);
+  const spdlog::log_clock::time_point now = spdlog::log_clock::now();
+  const auto severity = static_cast<spdlog::level::level_enum>(level);
+  if (on_terminal) terminal_log_->log(now, spdlog::source_loc(), severity, text);
+  if (file_log_) file_log_->log(now, spdlog::source_loc(), severity, text);
+}
+
+void Console::LogStage() {
+  if (options_.verbosity < 1) return;
+  const ProgressView view = View(0);
+  Log(spdlog::level::info, fmt::format("{} ended: {} pairs tested, {} edges",
+                                       StageTitle(progress_.stage, progress_.iteration),
+                                       view.num_tested_now, view.num_edges_now));
+}
+
+void Console::Watch() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!ended_.wait_for(lock, kFrame, [this] { return ends_; })) {
+    if (interrupted_ && !said_interrupted_) {
+      said_interrupted_ = true;
+      Log(spdlog::level::info,
+          "Stopping after the pairs that COLMAP is working on; once more gives them up.");
+    }
+    if (!has_progress_) continue;
+    const double seconds = Seconds();
+    LogProgressIfDue(seconds);
+    if (!is_drawn_current_ || seconds - last_drawn_ >= kLongestFrame) Draw(seconds);
   }
+}
+
+void Console::LogProgressIfDue(double seconds) {
+  if (seconds < next_logged_ || options_.quiet) return;
+  while (next_logged_ <= seconds) {
+    next_logged_ = next_logged_ == 1   ? 2
+                   : next_logged_ == 2 ? 5
+                   : next_logged_ == 5 ? kLogInterval
+                                       : next_logged_ + kLogInterval;
+  }
+  Log(spdlog::level::info, FormatProgress(View(seconds)), !has_block_);
+}
+
+void Console::Draw(double seconds) {
+  if (!has_block_) return;
+  if (continued_.exchange(false)) sink_->LeaveBlock();
+  // In the background the screen is another program's.
+  if (::tcgetpgrp(::fileno(stream_)) != ::getpgrp()) return;
+  sink_->ShowBlock(View(seconds));
+  last_drawn_ = seconds;
+  is_drawn_current_ = true;
+}
+
+double Console::Seconds() const {
+  return std::chrono::duration<double>(Clock::now() - start_).count();
+}
+
+ProgressView Console::View(double seconds) const {
+  ProgressView view;
+  view.loop = progress_;
+  view.num_tested_now = progress_.all.num_tested - before_stage_.num_tested;
+  view.num_edges_now = progress_.all.num_edges - before_stage_.num_edges;
+  view.rate = rate_.At(seconds);
+  view.seconds = seconds;
+  return view;
 }
 
 std::string WithoutControlCharacters(std::string text) {
@@ -153,38 +390,13 @@ std::string WithoutControlCharacters(std::string text) {
     return (byte < ' ' && c != '\n' && c != '\t') || byte == 0x7F;
   };
   std::replace_if(text.begin(), text.end(), is_control, '?');
-  return text;
-}
-
-std::string FormatDuration(double seconds) {
-  if (seconds < 100) return fmt::format("{:.1f} s", seconds);
-  if (seconds < 100 * 60) return fmt::format("{:.1f} min", seconds / 60);
-  return fmt::format("{:.1f} h", seconds / 3600);
-}
-
-std::string FormatProgress(const LoopProgress& progress, double seconds_of_matching) {
-  const StageStatistics& all = progress.all;
-  static const std::map<LoopStage, const char*> kNames = {
-      {LoopStage::kSampling, "sampling"},   {LoopStage::kPropagation, "propagation"},
-      {LoopStage::kListed, "matching"},     {LoopStage::kRetrieval, "retrieval"},
-      {LoopStage::kExpansion, "expansion"},
-  };
-  std::string line = kNames.at(progress.stage);
-  const bool repeats =
-      progress.stage != LoopStage::kListed && progress.stage != LoopStage::kRetrieval;
-  if (repeats) line += fmt::format(" {}", progress.iteration + 1);
-  line += fmt::format(": {} tested", all.num_tested);
-  if (all.num_tested > 0 && seconds_of_matching > 1) {
-    const double rate = static_cast<double>(all.num_tested) / seconds_of_matching;
-    line += fmt::format(
-        ", {:.1f}/s, about {} left", rate,
-        FormatDuration(std::ceil(static_cast<double>(progress.expected_remaining_tests) / rate)));
+  // U+0080 to U+009F in UTF-8: to some terminals U+009B is what ESC [ is.
+  for (std::size_t i = text.find('\xC2'); i != std::string::npos; i = text.find('\xC2', i + 1)) {
+    if (i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0) {
+      text.replace(i, 2, "?");
+    }
   }
-  // The most important first: a terminal cuts off what it has no room for.
-  line += fmt::format("; {} edges in all, components {}, largest {}, without an edge {}",
-                      progress.num_edges, progress.num_components, progress.largest_component,
-                      progress.num_isolated);
-  return line;
+  return text;
 }
 
 std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result) {

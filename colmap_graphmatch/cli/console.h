@@ -1,18 +1,32 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
 
+#include "colmap_graphmatch/cli/log_options.h"
+#include "colmap_graphmatch/cli/progress.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+
+namespace spdlog {
+class logger;
+}
 
 namespace colmap_graphmatch {
 
-// Messages and progress on a stream: one line that is rewritten in place on a terminal, a new line
-// every few seconds otherwise.
+// The log and the progress of a run. Lines look like glog's:
+//   I20261124 14:12:53.123456 12345 graphmatch_matcher] message
+// On a terminal a block of lines below them shows the progress; elsewhere it is logged, after 1, 2,
+// 5 and then every 10 seconds. A thread of its own draws the block, at most ten times a second.
 class Console : public PipelineObserver {
  public:
-  explicit Console(std::FILE* stream);
+  // Throws FileError if the log file cannot be written.
+  explicit Console(const LogOptions& options);
   ~Console() override;
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
@@ -20,32 +34,58 @@ class Console : public PipelineObserver {
   void OnInfo(const std::string& message) override;
   void OnWarning(const std::string& message) override;
   void OnProgress(const LoopProgress& progress) override;
+  void Error(const std::string& message);
 
-  // Ends the line in place, if one is shown.
-  void ClearProgress();
+  // Takes the block away: nothing more is to come.
+  void EndProgress();
+
+  // Has it said that the run ends soon. Lock-free: for a signal handler.
+  void NoteInterrupt() noexcept { interrupted_ = true; }
+
+  // Has the block begin on a new line, as after Ctrl-Z and fg. For the handler of SIGCONT.
+  void NoteContinue() noexcept { continued_ = true; }
 
  private:
-  void Print(const std::string& text);
-
+  class TerminalSink;
   using Clock = std::chrono::steady_clock;
 
+  void Watch();
+  void Log(int level, const std::string& message, bool on_terminal = true);
+  void LogProgressIfDue(double seconds);
+  void LogStage();
+  void Draw(double seconds);
+  double Seconds() const;  // Since the first answer.
+  ProgressView View(double seconds) const;
+
+  LogOptions options_;
   std::FILE* stream_;
-  bool is_terminal_;
-  bool showing_progress_ = false;
-  Clock::time_point start_of_matching_;
-  Clock::time_point last_progress_;
-  bool matching_ = false;
+  bool has_color_ = false;
+  bool has_block_ = false;  // The stream is a terminal that can show one.
+  std::shared_ptr<TerminalSink> sink_;
+  std::unique_ptr<spdlog::logger> terminal_log_;
+  std::unique_ptr<spdlog::logger> file_log_;
+
+  std::mutex mutex_;  // Of everything below.
+  std::condition_variable ended_;
+  bool ends_ = false;
+  bool has_progress_ = false;
+  LoopProgress progress_;
+  Clock::time_point start_;
+  StageStatistics before_stage_;
+  RecentRate rate_;
+  double next_logged_ = 1;  // Seconds.
+  double last_drawn_ = 0;
+  bool is_drawn_current_ = false;
+  bool said_interrupted_ = false;
+
+  std::atomic<bool> interrupted_{false};
+  std::atomic<bool> continued_{false};
+  std::thread watcher_;
 };
 
 // With '?' in their place, but for line ends and tabs. Names from a database could otherwise give
 // orders to the terminal.
 std::string WithoutControlCharacters(std::string text);
-
-// "12 s", "3.4 min", "5.1 h".
-std::string FormatDuration(double seconds);
-
-// The progress in one line: stage, pairs tested, edges, efficiency, components, rate, time left.
-std::string FormatProgress(const LoopProgress& progress, double seconds_of_matching);
 
 // What the run found and what it cost.
 std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result);

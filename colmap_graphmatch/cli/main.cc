@@ -1,12 +1,12 @@
-#include <unistd.h>
-
+#include <atomic>
 #include <cerrno>
 #include <csignal>
-#include <cstdio>
 #include <cstring>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <new>
+#include <string>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/stop_request.h"
@@ -23,37 +23,47 @@ namespace colmap_graphmatch {
 namespace {
 
 StopRequest stop_request;
+std::atomic<Console*> signalled_console{nullptr};
 
-void HandleSignal(int /*signal*/) {
-  const bool first = !stop_request.Requested();
+void HandleSignal(int signal) {
+  Console* console = signalled_console;
+  if (signal == SIGCONT) {
+    if (console != nullptr) console->NoteContinue();
+    return;
+  }
   stop_request.Raise();
-  if (!first) return;
-  static constexpr char kMessage[] =
-      "\nStopping after the pairs that COLMAP is working on; once more gives them up.\n";
-  const auto ignored = ::write(STDERR_FILENO, kMessage, sizeof(kMessage) - 1);
-  static_cast<void>(ignored);
+  if (console != nullptr) console->NoteInterrupt();
 }
 
-void InstallSignalHandlers() {
-  struct sigaction action = {};
-  action.sa_handler = HandleSignal;
-  action.sa_flags = SA_RESTART;
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
-  // The terminal is gone; with nohup the signal is ignored already and stays so.
-  struct sigaction hangup = {};
-  ::sigaction(SIGHUP, nullptr, &hangup);
-  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
-  // Output that nobody reads any more must not end a run of hours.
-  std::signal(SIGPIPE, SIG_IGN);
-}
+// For as long as it lives, signals ask the run to stop and tell the console so.
+class SignalHandlers {
+ public:
+  explicit SignalHandlers(Console* console) {
+    signalled_console = console;
+    struct sigaction action = {};
+    action.sa_handler = HandleSignal;
+    action.sa_flags = SA_RESTART;
+    ::sigaction(SIGINT, &action, nullptr);
+    ::sigaction(SIGTERM, &action, nullptr);
+    ::sigaction(SIGCONT, &action, nullptr);
+    // The terminal is gone; with nohup the signal is ignored already and stays so.
+    struct sigaction hangup = {};
+    ::sigaction(SIGHUP, nullptr, &hangup);
+    if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
+    // Output that nobody reads any more must not end a run of hours.
+    std::signal(SIGPIPE, SIG_IGN);
+  }
+  ~SignalHandlers() { signalled_console = nullptr; }
+  SignalHandlers(const SignalHandlers&) = delete;
+  SignalHandlers& operator=(const SignalHandlers&) = delete;
+};
 
 // Results are in the database, and a full disk under the standard output changes nothing about
 // that: no reason for another exit code, but for a word.
-void WarnIfNotWritten(const std::ostream& stream) {
+void WarnIfNotWritten(const std::ostream& stream, Console& console) {
   if (stream) return;
-  std::cerr << "Warning: The standard output could not be written: " << std::strerror(errno)
-            << ". Nothing else is lost." << std::endl;
+  console.OnWarning(std::string("The standard output could not be written: ") +
+                    std::strerror(errno) + ". Nothing else is lost.");
 }
 
 // The files that were asked for.
@@ -67,9 +77,8 @@ void WriteFiles(const CommandLine& line, const PipelineResult& result, Console& 
   if (!line.graph_path.empty()) WriteGraph(line.graph_path, result);
 }
 
-int Run(const CommandLine& line) {
-  InstallSignalHandlers();
-  Console console(stderr);
+int Run(const CommandLine& line, Console& console) {
+  const SignalHandlers handlers(&console);
   for (const std::string& message : line.unused_options) console.OnInfo(message);
   for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
@@ -77,9 +86,11 @@ int Run(const CommandLine& line) {
       if (!path.empty()) CheckCanWrite(path);
     }
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
-    console.ClearProgress();
-    std::cout << FormatSummary(line.pipeline, result) << std::flush;
-    WarnIfNotWritten(std::cout);
+    console.EndProgress();
+    if (!line.log.quiet) {
+      std::cout << FormatSummary(line.pipeline, result) << std::flush;
+      WarnIfNotWritten(std::cout, console);
+    }
     WriteFiles(line, result, console);
     if (result.matching.finished) return kExitSuccess;
     if (result.stopped_by != PipelineResult::StoppedBy::kRequest) {
@@ -99,23 +110,26 @@ int Run(const CommandLine& line) {
 }
 
 int Main(int argc, const char* const* argv) {
-  const auto fail = [](const char* message, ExitCode code) {
-    std::cerr << "Error: " << WithoutControlCharacters(message) << std::endl;
+  // Until it is known what the user wants.
+  auto console = std::make_unique<Console>(LogOptions());
+  const auto fail = [&](const char* message, ExitCode code) {
+    console->Error(message);
     return code;
   };
   try {
     const CommandLine line = ParseCommandLine(argc, argv);
     if (line.help) {
       PrintHelp(std::cout);
-      WarnIfNotWritten(std::cout.flush());
+      WarnIfNotWritten(std::cout.flush(), *console);
       return kExitSuccess;
     }
     if (line.version) {
       std::cout << "graphmatch_matcher " << kVersion << std::endl;
-      WarnIfNotWritten(std::cout);
+      WarnIfNotWritten(std::cout, *console);
       return kExitSuccess;
     }
-    return Run(line);
+    console = std::make_unique<Console>(line.log);
+    return Run(line, *console);
   } catch (const OptionsError& error) {
     return fail(error.what(), kExitOptions);
   } catch (const DatabaseLockedError& error) {

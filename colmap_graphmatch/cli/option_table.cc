@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -46,6 +47,11 @@ const Names<ImageVectorOptions::Descriptor> kDescriptors = {
     {"vlad", ImageVectorOptions::Descriptor::kVlad},
     {"gist", ImageVectorOptions::Descriptor::kGist},
     {"file", ImageVectorOptions::Descriptor::kFile}};
+const Names<LogOptions::Target> kLogTargets = {
+    {"stderr", LogOptions::Target::kStderr},
+    {"stdout", LogOptions::Target::kStdout},
+    {"file", LogOptions::Target::kFile},
+    {"stderr_and_file", LogOptions::Target::kStderrAndFile}};
 const Names<ImageVectorOptions::FeatureSelection> kSelections = {
     {"largest", ImageVectorOptions::FeatureSelection::kLargestScales},
     {"random", ImageVectorOptions::FeatureSelection::kRandom}};
@@ -81,11 +87,13 @@ Value BoolOf(bool* field) {
           }};
 }
 
-Value IntOf(int* field, int minimum) {
-  return {"an integer of at least " + std::to_string(minimum), std::to_string(*field),
-          [field, minimum](const std::string& text) {
+Value IntOf(int* field, int minimum, int maximum = std::numeric_limits<int>::max()) {
+  const bool is_bounded = maximum < std::numeric_limits<int>::max();
+  return {is_bounded ? fmt::format("an integer from {} to {}", minimum, maximum)
+                     : fmt::format("an integer of at least {}", minimum),
+          std::to_string(*field), [field, minimum, maximum](const std::string& text) {
             const std::optional<int> value = Number<int>(text);
-            if (!value || *value < minimum) return false;
+            if (!value || *value < minimum || *value > maximum) return false;
             *field = *value;
             return true;
           }};
@@ -166,6 +174,15 @@ Value OneOf(Enum* field, const Names<Enum>& names) {
   return value;
 }
 
+// Nothing is as good as not given.
+template <typename T>
+Value TextOrNothingOf(T* field, const std::string& values) {
+  return {values + ", or nothing", "", [field](const std::string& text) {
+            *field = text;
+            return true;
+          }};
+}
+
 Value Anything() {
   return {"anything", "", [](const std::string&) { return true; }};
 }
@@ -181,6 +198,7 @@ class Table {
     AddMatching();
     AddWork();
     AddEvaluation();
+    AddLog();
     AddColmapMatching();
     AddUnusedOptions();
     return std::move(rows_);
@@ -292,6 +310,7 @@ class Table {
   void AddMatching();
   void AddWork();
   void AddEvaluation();
+  void AddLog();
   void AddColmapMatching();
   void AddUnusedOptions();
 
@@ -332,11 +351,7 @@ void Table::AddGraph() {
       "a file of image pairs to be tested instead, two names a line");
   AddColmap(Use::kHere, {{{3, 8}, "VocabTreeMatching.match_list_path", ""}},
             // COLMAP's default is an empty one.
-            {"the path of a list of images, or nothing", "",
-             [list = &p.image_list_path](const std::string& text) {
-               *list = text;
-               return true;
-             }},
+            TextOrNothingOf(&p.image_list_path, "the path of a list of images"),
             "a file of image names, one a line: only these look for partners, among all images");
   Add("GraphMatching.number_sample_iterations", IntOf(&p.graph.number_sample_iterations, 0),
       "iterations (>= 0) that sample before propagating; later ones only propagate");
@@ -478,6 +493,32 @@ void Table::AddEvaluation() {
       "seconds (>= 0) of one core that it counts for a pair with enough matches to be verified");
 }
 
+void Table::AddLog() {
+  LogOptions& log = line_->log;
+  Section("What is printed");
+  Add("GraphMatching.quiet", BoolOf(&log.quiet),
+      "print nothing but warnings and errors: no progress and no summary");
+  AddColmap(Use::kHere, {{{4, 0}, "log_severity", "0"}}, IntOf(&log.severity, 0, 3),
+            "the least severity that is logged; 0: info, 1: warnings, 2 and 3: errors. The block "
+            "of progress on a terminal and the summary stay");
+  AddColmap(Use::kHere, {{{3, 8}, "log_level", "2"}, {{3, 9}, "log_level", "0"}},
+            IntOf(&log.verbosity, 0),
+            "how much is logged; from 1 on every stage of every iteration has a line");
+  AddColmap(Use::kHere, {{{4, 0}, "log_target", "stderr_and_file"}},
+            OneOf(&log.target, kLogTargets),
+            "where the log goes: the standard error output, and with log_path that file. Errors "
+            "that end the program are on the standard error output in any case");
+  AddColmap(Use::kHere, {{{4, 0}, "log_path", ""}},
+            TextOrNothingOf(&log.path, "the path of a file or a directory"),
+            "the file to which the log is appended; of a directory graphmatch_matcher.log in it");
+  AddColmap(Use::kHere,
+            {{{3, 8}, "log_to_stderr", "0"}, {{3, 9}, "log_to_stderr", "1"}, {{4, 0}, "", ""}},
+            BoolOf(&line_->log_to_stderr),
+            "0 with log_path: log to that file alone; without it no effect");
+  AddColmap(Use::kHere, {{{4, 0}, "log_color", "1"}}, BoolOf(&log.color),
+            "colours on a terminal, unless the environment variable NO_COLOR is set");
+}
+
 void Table::AddColmapMatching() {
   PipelineOptions& p = line_->pipeline;
   DescriptorMatchingOptions& matching = p.verification.exact.matching;
@@ -578,15 +619,6 @@ void Table::AddUnusedOptions() {
             "pairs are found by verifying them");
   AddUnused({{{3, 13}, "FeatureMatching.rig_verification", "0"}},
             "verify rigs afterwards with `colmap geometric_verifier`");
-
-  const char* log = "COLMAP's log is not kept";
-  AddUnused({{{3, 8}, "log_to_stderr", "0"}, {{3, 9}, "log_to_stderr", "1"}, {{4, 0}, "", ""}},
-            log);
-  AddUnused({{{3, 8}, "log_level", "2"}, {{3, 9}, "log_level", "0"}}, log);
-  AddUnused({{{4, 0}, "log_target", "stderr_and_file"}}, log);
-  AddUnused({{{4, 0}, "log_path", ""}}, log);
-  AddUnused({{{4, 0}, "log_severity", "0"}}, log);
-  AddUnused({{{4, 0}, "log_color", "1"}}, log);
 
   using NamesAndDefaults = std::vector<std::pair<const char*, const char*>>;
   const char* sift = "only SIFT features are matched";

@@ -127,6 +127,11 @@ class Parser {
     }
     p.verification.num_threads = p.num_threads;
     CheckOutputs();
+    LogOptions& log = line_->log;
+    if (!line_->log_to_stderr && !log.path.empty()) log.target = LogOptions::Target::kFile;
+    if (log.target == LogOptions::Target::kFile && log.path.empty()) {
+      throw OptionsError("--log_target file needs --log_path, the file that is meant.");
+    }
     p.Check();
   }
 

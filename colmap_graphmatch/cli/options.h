@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/cli/log_options.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 
 namespace colmap_graphmatch {
@@ -17,6 +18,8 @@ struct CommandLine {
   std::filesystem::path report_path;
   std::filesystem::path pair_list_path;
   std::filesystem::path graph_path;
+  LogOptions log;
+  bool log_to_stderr = true;
   bool seed_from_clock = false;
   bool lightglue = false;  // The matcher's type is SIFT_LIGHTGLUE.
   // What is to be said about options of vocab_tree_matcher that were given and have no meaning

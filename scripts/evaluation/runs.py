@@ -3,6 +3,7 @@
 import csv
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import time
@@ -88,7 +89,8 @@ def run_logged(command: list[str], log: Path, harmless: str = "") -> float:
         code = subprocess.run(command, stdout=file, stderr=subprocess.STDOUT, check=False).returncode
     text = log.read_text(errors="replace") if code != 0 else ""
     if code != 0 and not (harmless and harmless in text):
-        last = text.strip().splitlines()[-1]
+        # Of this project's programs and of COLMAP: without glog's time and place.
+        last = re.sub(r"^[IWEF]\d{8} \S+ +\d+ [^]]*\] ", "", text.strip().splitlines()[-1])
         raise EvaluationError(f"{command[0]} ended with exit code {code}: {last} (see {log})")
     return time.monotonic() - start
 

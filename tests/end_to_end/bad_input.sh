@@ -77,9 +77,10 @@ snapshot() {
 # The message of the last run, on one line, with words for what differs from run to run.
 message() {
   local text
-  text=$(sed -n '/^Error: /,$p' "$work/output.txt")
+  text=$(sed -n '/^E[0-9]\{8\} /,$p' "$work/output.txt")
   # What COLMAP printed follows a warning that ends with a colon.
-  [[ -n $text ]] || text=$(sed -n '/^Warning: /{p;/:$/{n;p}}' "$work/output.txt")
+  [[ -n $text ]] || text=$(sed -n '/^W[0-9]\{8\} /{p;/:$/{n;p}}' "$work/output.txt")
+  text=$(sed -E 's/^[EW][0-9]{8} [0-9:.]+ [0-9]+ graphmatch_matcher\] //' <<<"$text")
   text=${text//"$database"/DATABASE}
   text=${text//"$fake"//usr/bin/colmap}
   text=${text//"$work"//home/you}

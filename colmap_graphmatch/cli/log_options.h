@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+
+namespace colmap_graphmatch {
+
+// What is logged, and where. Errors that end the program reach the standard error output always.
+struct LogOptions {
+  enum class Target { kStderr, kStdout, kFile, kStderrAndFile };
+
+  Target target = Target::kStderrAndFile;
+  std::filesystem::path path;  // A file, appended to, or a directory; empty: no file.
+  int severity = 0;            // The least one that is logged: 0 info, 1 warnings, 2 and 3 errors.
+  int verbosity = 0;           // From 1 on every stage of every iteration has a line.
+  bool color = true;           // On a terminal, unless NO_COLOR is set.
+  bool quiet = false;          // No progress, and no severity below warnings.
+};
+
+}  // namespace colmap_graphmatch

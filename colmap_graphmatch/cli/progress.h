@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "colmap_graphmatch/graph/graphmatch.h"
+
+namespace colmap_graphmatch {
+
+// Pairs a second in the recent past: what is t seconds old weighs exp(-t / kWindow).
+class RecentRate {
+ public:
+  static constexpr double kWindow = 30;  // Seconds.
+
+  // The total so far, at a time in seconds. Both ascend; what comes in the first half second is
+  // the end of what was begun before, and does not count.
+  void Update(double seconds, std::size_t total);
+
+  // At a time not before the last update; 0 as long as it is not known.
+  double At(double seconds) const;
+
+ private:
+  bool begun_ = false;
+  double begin_ = 0;
+  double last_ = 0;
+  std::size_t last_total_ = 0;
+  double weighted_count_ = 0;
+  double weighted_seconds_ = 0;
+};
+
+// Where a run is, as a terminal and a log show it.
+struct ProgressView {
+  LoopProgress loop;
+  // Of the stage of this iteration alone.
+  std::size_t num_tested_now = 0;
+  std::size_t num_edges_now = 0;
+  double rate = 0;     // Pairs a second in the recent past; 0: not known yet.
+  double seconds = 0;  // Since the first answer.
+
+  double ShareDone() const;    // Of the tests, those to come as expected.
+  double SecondsLeft() const;  // Negative: not known yet.
+};
+
+// "propagation 3", iterations counted from 1; stages that do not repeat have no number.
+std::string StageTitle(LoopStage stage, int iteration);
+
+// The progress as lines of at most `width` columns, 2 to 4 of them from 60 columns on: fields flow
+// to as many lines as they need and none is cut.
+std::vector<std::string> FormatBlock(const ProgressView& view, std::size_t width);
+
+// The same for a log, in one line.
+std::string FormatProgress(const ProgressView& view);
+
+// "12.3 s", "3.4 min", "5.1 h".
+std::string FormatDuration(double seconds);
+
+}  // namespace colmap_graphmatch
