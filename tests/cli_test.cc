@@ -254,6 +254,29 @@ TEST(RecentRate, IsThatOfTheLastHalfMinuteOrSo) {
   EXPECT_NEAR(rate.At(630.4), 10 * std::exp(-1), 0.1);
 }
 
+TEST(TimeLeft, CountsSamplesAtTheirOwnRate) {
+  TimeLeft left;
+  LoopProgress progress;
+  double seconds = 0;
+  EXPECT_LT(left.At(0), 0);
+  left.Update(0, progress);
+  // Sampling tests 100 pairs a second, propagation 10; for a minute, and in turns of 4 seconds.
+  for (int i = 0; i < 60; ++i) {
+    progress.stage = i / 4 % 2 == 0 ? LoopStage::kSampling : LoopStage::kPropagation;
+    progress.all.num_tested += progress.stage == LoopStage::kSampling ? 100 : 10;
+    progress.expected_remaining_tests = 1100;
+    progress.expected_remaining_samples = 1000;
+    left.Update(++seconds, progress);
+    // As long as only one of the rates is known it is that of both.
+    if (i == 2) {
+      EXPECT_NEAR(left.At(seconds), 11, 1e-6);
+    }
+  }
+  EXPECT_NEAR(left.At(seconds), 1000 / 100.0 + 100 / 10.0, 1e-6);
+  // Nothing comes any more.
+  EXPECT_GT(left.At(seconds + 30), 25);
+}
+
 ProgressView MakeView(std::size_t scale) {
   ProgressView view;
   view.loop.stage = LoopStage::kPropagation;
@@ -269,6 +292,7 @@ ProgressView MakeView(std::size_t scale) {
   view.num_edges_now = 1;
   view.rate = static_cast<double>(scale) / 100;
   view.seconds = static_cast<double>(scale);
+  view.seconds_left = scale > 0 ? 100 : -1;
   return view;
 }
 

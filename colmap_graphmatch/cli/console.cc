@@ -308,6 +308,7 @@ void Console::OnProgress(const LoopProgress& progress) {
   is_drawn_current_ = false;
   const double seconds = Seconds();
   rate_.Update(seconds, progress.all.num_tested);
+  time_left_.Update(seconds, progress);
   if (is_first) Draw(seconds);
 }
 
@@ -380,6 +381,7 @@ ProgressView Console::View(double seconds) const {
   view.num_tested_now = progress_.all.num_tested - before_stage_.num_tested;
   view.num_edges_now = progress_.all.num_edges - before_stage_.num_edges;
   view.rate = rate_.At(seconds);
+  view.seconds_left = time_left_.At(seconds);
   view.seconds = seconds;
   return view;
 }

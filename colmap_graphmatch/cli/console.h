@@ -73,6 +73,7 @@ class Console : public PipelineObserver {
   Clock::time_point start_;
   StageStatistics before_stage_;
   RecentRate rate_;
+  TimeLeft time_left_;
   double next_logged_ = 1;  // Seconds.
   double last_drawn_ = 0;
   bool is_drawn_current_ = false;

@@ -46,10 +46,9 @@ std::string Bar(double share, std::size_t length) {
 
 int Percent(double share) { return static_cast<int>(100 * share); }
 
-std::string TimeLeft(const ProgressView& view) {
-  const double seconds = view.SecondsLeft();
-  if (seconds < 0) return "time left: not known yet";
-  return "about " + FormatDuration(std::ceil(seconds)) + " left";
+std::string FormatTimeLeft(const ProgressView& view) {
+  if (view.seconds_left < 0) return "time left: not known yet";
+  return "about " + FormatDuration(std::ceil(view.seconds_left)) + " left";
 }
 
 }  // namespace
@@ -79,14 +78,37 @@ double RecentRate::At(double seconds) const {
   return weighted_count_ * decay / (weighted_seconds_ * decay + WeightOf(seconds - last_));
 }
 
+void TimeLeft::Update(double seconds, const LoopProgress& progress) {
+  Part& part = progress.stage == LoopStage::kSampling ? sampling_ : others_;
+  if (begun_) part.seconds += seconds - last_;
+  part.num_tested += progress.all.num_tested - progress_.all.num_tested;
+  part.rate.Update(part.seconds, part.num_tested);
+  begun_ = true;
+  last_ = seconds;
+  progress_ = progress;
+}
+
+double TimeLeft::RateAt(double seconds, bool of_sampling) const {
+  const Part& part = of_sampling ? sampling_ : others_;
+  // Waiting belongs to the stage that it is in.
+  const bool is_now = of_sampling == (progress_.stage == LoopStage::kSampling);
+  return part.rate.At(part.seconds + (is_now ? seconds - last_ : 0));
+}
+
+double TimeLeft::At(double seconds) const {
+  const auto num_samples = static_cast<double>(progress_.expected_remaining_samples);
+  const double num_others = static_cast<double>(progress_.expected_remaining_tests) - num_samples;
+  double of_samples = RateAt(seconds, true);
+  double of_others = RateAt(seconds, false);
+  if (of_samples == 0) of_samples = of_others;
+  if (of_others == 0) of_others = of_samples;
+  return of_samples > 0 ? num_samples / of_samples + num_others / of_others : -1;
+}
+
 double ProgressView::ShareDone() const {
   const auto done = static_cast<double>(loop.all.num_tested);
   const double all = done + static_cast<double>(loop.expected_remaining_tests);
   return all > 0 ? done / all : 0;
-}
-
-double ProgressView::SecondsLeft() const {
-  return rate > 0 ? static_cast<double>(loop.expected_remaining_tests) / rate : -1;
 }
 
 std::string StageTitle(LoopStage stage, int iteration) {
@@ -99,7 +121,7 @@ std::vector<std::string> FormatBlock(const ProgressView& view, std::size_t width
   const LoopProgress& loop = view.loop;
   const double share = view.ShareDone();
   const std::string title = StageTitle(loop.stage, loop.iteration);
-  const std::string end = fmt::format(" {:>2} %{}{}", Percent(share), kGap, TimeLeft(view));
+  const std::string end = fmt::format(" {:>2} %{}{}", Percent(share), kGap, FormatTimeLeft(view));
   // Of the line the title, a space, the brackets and the end are no bar.
   const std::size_t used = title.size() + 1 + 2 + end.size();
   const std::size_t bar = width > used ? std::min(width - used, kLongestBar) : 0;
@@ -131,7 +153,7 @@ std::string FormatProgress(const ProgressView& view) {
       "{}: {} pairs tested ({} %), {:.1f} pairs/s, {}; {} edges, {}; {} components, largest {} "
       "images, {} images alone",
       StageTitle(loop.stage, loop.iteration), loop.all.num_tested, Percent(view.ShareDone()),
-      view.rate, TimeLeft(view), loop.num_edges, Efficiency(view), loop.num_components,
+      view.rate, FormatTimeLeft(view), loop.num_edges, Efficiency(view), loop.num_components,
       loop.largest_component, loop.num_isolated);
 }
 

@@ -29,17 +29,43 @@ class RecentRate {
   double weighted_seconds_ = 0;
 };
 
+// How long the tests to come take, at the recent rates of sampling and of everything else: most
+// pairs that sampling draws late in a run have hardly any matches and take a fraction of the time
+// of others.
+class TimeLeft {
+ public:
+  void Update(double seconds, const LoopProgress& progress);
+
+  // In seconds, at a time not before the last update; negative: not known yet.
+  double At(double seconds) const;
+
+ private:
+  struct Part {
+    RecentRate rate;  // Over `seconds`.
+    double seconds = 0;
+    std::size_t num_tested = 0;
+  };
+
+  double RateAt(double seconds, bool of_sampling) const;
+
+  Part sampling_;
+  Part others_;
+  bool begun_ = false;
+  double last_ = 0;
+  LoopProgress progress_;
+};
+
 // Where a run is, as a terminal and a log show it.
 struct ProgressView {
   LoopProgress loop;
   // Of the stage of this iteration alone.
   std::size_t num_tested_now = 0;
   std::size_t num_edges_now = 0;
-  double rate = 0;     // Pairs a second in the recent past; 0: not known yet.
-  double seconds = 0;  // Since the first answer.
+  double rate = 0;           // Pairs a second in the recent past; 0: not known yet.
+  double seconds = 0;        // Since the first answer.
+  double seconds_left = -1;  // Negative: not known yet.
 
-  double ShareDone() const;    // Of the tests, those to come as expected.
-  double SecondsLeft() const;  // Negative: not known yet.
+  double ShareDone() const;  // Of the tests, those to come as expected.
 };
 
 // "propagation 3", iterations counted from 1; stages that do not repeat have no number.

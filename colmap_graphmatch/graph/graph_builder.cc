@@ -78,8 +78,8 @@ StageStatistics& GraphBuilder::Total(LoopStage stage) {
 }
 
 StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
-                                     const std::vector<VertexPair>& pairs,
-                                     double num_future_tests) {
+                                     const std::vector<VertexPair>& pairs, double num_future_tests,
+                                     double num_future_samples) {
   StageStatistics batch;
   if (pairs.empty()) return batch;
   const Stopwatch stopwatch;
@@ -116,8 +116,10 @@ StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
     progress.iteration = iteration;
     progress.last = verified;
     progress.last_is_known = is_known;
-    Report(progress, batch.num_edges + batch.num_known_edges,
-           static_cast<double>(pairs.size() - tested.size()) + num_future_tests);
+    const auto num_left = static_cast<double>(pairs.size() - tested.size());
+    progress.expected_remaining_samples = static_cast<std::size_t>(
+        num_future_samples + (stage == LoopStage::kSampling ? num_left : 0));
+    Report(progress, batch.num_edges + batch.num_known_edges, num_left + num_future_tests);
   });
   batch.seconds = stopwatch.Seconds();
   Total(stage) = before + batch;

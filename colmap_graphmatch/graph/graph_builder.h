@@ -30,7 +30,7 @@ class GraphBuilder {
   // Has the pairs, which are ascending and none of which is in the graph, tested, and adds them.
   // Returns the statistics of this batch alone.
   StageStatistics Verify(LoopStage stage, int iteration, const std::vector<VertexPair>& pairs,
-                         double num_future_tests);
+                         double num_future_tests, double num_future_samples = 0);
 
   // False once the verifier was asked to stop: nothing more is to be verified.
   bool Continues() const { return result_.finished; }

@@ -64,8 +64,8 @@ class Loop {
     sampler_.Charge();
     // Of the draws to come ever fewer coincide.
     sampling_batch_ = static_cast<double>(pairs.size() + sampler_.NumDrawn()) / 2;
-    last_sampling_ =
-        builder_.Verify(LoopStage::kSampling, iteration_, pairs, ExpectedTestsAfter(0));
+    last_sampling_ = builder_.Verify(LoopStage::kSampling, iteration_, pairs, ExpectedTestsAfter(0),
+                                     ExpectedSamples());
     iterations_.back().sampling = last_sampling_;
     sampling_over_ = options_.stop_sampling_without_edges &&
                      last_sampling_.num_edges + last_sampling_.num_known_edges == 0;
@@ -78,7 +78,7 @@ class Loop {
         options_.propagate_from_new_edges_only ? first_new_edge_ : 0, threads_);
     first_new_edge_ = builder_.Graph().NumEdges();
     last_propagation_ = builder_.Verify(LoopStage::kPropagation, iteration_, pairs,
-                                        ExpectedTestsAfter(pairs.size()));
+                                        ExpectedTestsAfter(pairs.size()), ExpectedSamples());
     iterations_.back().propagation = last_propagation_;
     return !pairs.empty();
   }
@@ -94,12 +94,17 @@ class Loop {
     return true;
   }
 
+  // In later iterations.
+  double ExpectedSamples() const {
+    const int num_iterations =
+        sampling_over_ ? 0 : std::max(options_.number_sample_iterations - iteration_ - 1, 0);
+    return num_iterations * sampling_batch_;
+  }
+
   // After the batch that is tested next; num_propagated: its pairs, if propagation proposed them.
   double ExpectedTestsAfter(std::size_t num_propagated) const {
     if (!shows_progress_) return 0;
-    const int num_iterations =
-        sampling_over_ ? 0 : std::max(options_.number_sample_iterations - iteration_ - 1, 0);
-    const double sampling = num_iterations * sampling_batch_;
+    const double sampling = ExpectedSamples();
     if (options_.num_to_propagate == 0) return sampling;
     // In the end propagation tests every open pair of today, and each edge among them opens about
     // one more; edges are as frequent as they were last. To begin with there are hardly any open

@@ -54,6 +54,7 @@ struct LoopProgress {
   // tests what it could propose now and what the edges among that lead to (docs/benchmarks.md says
   // how good it is).
   std::size_t expected_remaining_tests = 0;
+  std::size_t expected_remaining_samples = 0;  // Those of them that sampling draws.
 };
 
 struct GraphMatchResult {
