@@ -303,7 +303,7 @@ for signal in INT TERM KILL INT KILL KILL HUP; do
   env --default-signal=HUP "$matcher" --database_path "$work/interrupted.db" --colmap_path "$fake" \
     >"$work/interrupted.txt" 2>&1 &
   pid=$!
-  wanted=$((wanted + 23))
+  wanted=$((wanted + 18))
   while kill -0 "$pid" 2>/dev/null && (($(count_tested "$work/interrupted.db" || echo 0) < wanted)); do
     sleep 0.01
   done
