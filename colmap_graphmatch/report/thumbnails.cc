@@ -1,0 +1,151 @@
+#include "colmap_graphmatch/report/thumbnails.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <system_error>
+
+namespace colmap_graphmatch {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kLongestSide = 128;  // In pixels.
+constexpr int kQuality = 70;       // Of JPEG, up to 100.
+
+// Collects images until there are enough of them.
+class Choice {
+ public:
+  explicit Choice(std::size_t limit) : limit_(limit) {}
+
+  void Add(const Json& image) { Add(image.get<std::size_t>()); }
+  void Add(std::size_t image) {
+    if (images_.size() < limit_) images_.insert(image);
+  }
+  bool Full() const { return images_.size() >= limit_; }
+  const std::set<std::size_t>& Images() const { return images_; }
+
+ private:
+  std::size_t limit_;
+  std::set<std::size_t> images_;
+};
+
+void AddListedImages(const Json& report, Choice* choice) {
+  for (const Json& image : report.at("images_without_edge")) {
+    choice->Add(image.at("image"));
+    for (const Json& candidate : image.at("candidates")) choice->Add(candidate.at("image"));
+  }
+  for (const Json& bridge : report.at("bridges")) {
+    for (const Json& image : bridge.at("images")) choice->Add(image);
+  }
+  for (const Json& point : report.at("articulation_points")) choice->Add(point.at("image"));
+  for (const Json& link : report.at("weak_links")) {
+    for (const Json& edge : link.at("edges")) {
+      choice->Add(edge.at(0));
+      choice->Add(edge.at(1));
+    }
+  }
+}
+
+// First one of every component, then the next of every component, so that none is left without.
+void AddBestConnectedImages(const Json& report, std::size_t num_images, Choice* choice) {
+  std::vector<std::size_t> degrees(num_images, 0);
+  for (const Json& edge : report.at("edge_list")) {
+    ++degrees.at(edge.at(0).get<std::size_t>());
+    ++degrees.at(edge.at(1).get<std::size_t>());
+  }
+  std::vector<std::vector<std::size_t>> components =
+      report.at("connected_components").get<std::vector<std::vector<std::size_t>>>();
+  for (std::vector<std::size_t>& component : components) {
+    std::stable_sort(component.begin(), component.end(),
+                     [&](std::size_t a, std::size_t b) { return degrees.at(a) > degrees.at(b); });
+  }
+  bool any = true;
+  for (std::size_t rank = 0; any && !choice->Full(); ++rank) {
+    any = false;
+    for (const std::vector<std::size_t>& component : components) {
+      if (rank < component.size()) {
+        choice->Add(component[rank]);
+        any = true;
+      }
+    }
+  }
+}
+
+// Empty if the file cannot be read.
+std::vector<unsigned char> ReadBytes(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return {};
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// Decoding JPEG at an eighth of the size takes a fraction of the time. Of a photo that is too small
+// for that, all pixels are decoded.
+cv::Mat Decode(const std::vector<unsigned char>& file) {
+  cv::Mat image = cv::imdecode(file, cv::IMREAD_REDUCED_COLOR_8);
+  if (std::max(image.rows, image.cols) < kLongestSide) image = cv::imdecode(file, cv::IMREAD_COLOR);
+  return image;
+}
+
+// Empty if there is no image in the file that can be decoded.
+std::string MakeThumbnail(const std::filesystem::path& path) {
+  const std::vector<unsigned char> file = ReadBytes(path);
+  if (file.empty()) return "";
+  std::vector<unsigned char> jpeg;
+  try {
+    cv::Mat image = Decode(file);
+    if (image.empty()) return "";
+    const double scale = static_cast<double>(kLongestSide) / std::max(image.rows, image.cols);
+    if (scale < 1) {
+      const cv::Size size(std::max(1, static_cast<int>(std::lround(image.cols * scale))),
+                          std::max(1, static_cast<int>(std::lround(image.rows * scale))));
+      cv::resize(image, image, size, 0, 0, cv::INTER_AREA);
+    }
+    cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  } catch (const cv::Exception&) {
+    // What OpenCV says of files that are damaged or have too many pixels.
+    return "";
+  }
+  return {jpeg.begin(), jpeg.end()};
+}
+
+}  // namespace
+
+std::vector<std::pair<std::size_t, std::string>> ChooseThumbnails(const std::string& json,
+                                                                  std::size_t max_num_thumbnails) {
+  const Json report = Json::parse(json);
+  const std::vector<std::string> names = report.at("image_names").get<std::vector<std::string>>();
+  Choice choice(max_num_thumbnails);
+  if (names.size() <= max_num_thumbnails) {
+    for (std::size_t i = 0; i < names.size(); ++i) choice.Add(i);
+  } else {
+    AddListedImages(report, &choice);
+    AddBestConnectedImages(report, names.size(), &choice);
+  }
+  std::vector<std::pair<std::size_t, std::string>> images;
+  for (const std::size_t image : choice.Images()) images.emplace_back(image, names.at(image));
+  return images;
+}
+
+std::map<std::size_t, std::string> MakeThumbnails(
+    const std::filesystem::path& image_path,
+    const std::vector<std::pair<std::size_t, std::string>>& images, ThreadPool& threads) {
+  std::vector<std::string> files(images.size());
+  threads.ParallelFor(images.size(), [&](std::size_t i) {
+    files[i] = MakeThumbnail(image_path / std::filesystem::u8path(images[i].second));
+  });
+  std::map<std::size_t, std::string> thumbnails;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (!files[i].empty()) thumbnails.emplace(images[i].first, std::move(files[i]));
+  }
+  return thumbnails;
+}
+
+}  // namespace colmap_graphmatch

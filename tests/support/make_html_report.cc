@@ -1,0 +1,26 @@
+// make_html_report REPORT.json PAGE.html [IMAGE_PATH]: the page of a report, with thumbnails of the
+// images below IMAGE_PATH, for tests of the page.
+
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "colmap_graphmatch/report/html_report.h"
+#include "colmap_graphmatch/report/thumbnails.h"
+
+int main(int argc, char** argv) {
+  if (argc != 3 && argc != 4) {
+    std::cerr << "make_html_report REPORT.json PAGE.html [IMAGE_PATH]\n";
+    return 1;
+  }
+  namespace gm = colmap_graphmatch;
+  std::ifstream file(argv[1], std::ios::binary);
+  const std::string json{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  std::map<std::size_t, std::string> thumbnails;
+  if (argc == 4) {
+    gm::ThreadPool threads(-1);
+    thumbnails = gm::MakeThumbnails(argv[3], gm::ChooseThumbnails(json), threads);
+  }
+  std::ofstream(argv[2], std::ios::binary) << gm::MakeHtmlReport(json, thumbnails);
+  return 0;
+}
