@@ -32,7 +32,7 @@ def make_report(names, components, edges, nonedges=(), without_edge=(), **member
     """A report in which this run has tested all pairs, by sampling and propagation in turns."""
     edges = sorted([min(a, b), max(a, b), inliers] for a, b, inliers in edges)
     tested = len(edges) + len(nonedges)
-    sampled, sampled_edges = tested // 3, len(edges) // 2
+    sampled, sampled_edges = tested // 2, len(edges) // 2
     discovery = []
     if tested:
         discovery = [dict(stage='sampling', iteration=0, tests=1, edges=1 if edges else 0, seconds=61.0),

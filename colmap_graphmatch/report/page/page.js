@@ -338,10 +338,13 @@ function showDiscovery() {
   // Most runs have no pairs that were tested before, and none that COLMAP fails on.
   const knownColumns = sumOfStages('known') > 0 ? [['Known before', true], ['of these edges', true]] : [];
   const failedColumn = sumOfStages('failed') > 0 ? [['Failed', true]] : [];
-  const columns = [['Stage'], ['Tested', true], ['Edges', true], ['Efficiency', true], ['Time', true],
-    ...knownColumns, ...failedColumn];
+  // (A replay takes no time worth telling.)
+  const timeColumn = report.replay ? [] : [['Time', true]];
+  const columns = [['Stage'], ['Tested', true], ['Edges', true], ['Efficiency', true], ...timeColumn, ...knownColumns,
+    ...failedColumn];
   const cells = (stage) => [count(stage.tested), count(stage.edges),
-    stage.tested ? percent(stage.edges / stage.tested) : '–', duration(stage.seconds),
+    stage.tested ? percent(stage.edges / stage.tested) : '–',
+    ...(timeColumn.length ? [duration(stage.seconds)] : []),
     ...(knownColumns.length ? [count(stage.known), count(stage.known_edges)] : []),
     ...(failedColumn.length ? [count(stage.failed)] : [])];
   const label = (name) => element('span', {}, swatch(name), capital(name));
