@@ -59,6 +59,10 @@ TEST(OptionTable, EveryRowTakesItsDefaultAndRefusesWhatItMustNotBe) {
       if (spelling.default_value.empty()) continue;
       EXPECT_TRUE(row.read(spelling.default_value)) << row.name << " " << spelling.default_value;
     }
+    for (const std::string& choice : row.choices) {
+      EXPECT_TRUE(row.read(choice)) << row.name << " " << choice;
+      EXPECT_NE(row.values.find(choice), std::string::npos) << row.name << " " << choice;
+    }
     const bool is_checked = row.values.find("integer") != std::string::npos ||
                             row.values.find("number") != std::string::npos ||
                             row.values.find("one of") != std::string::npos ||
@@ -68,6 +72,20 @@ TEST(OptionTable, EveryRowTakesItsDefaultAndRefusesWhatItMustNotBe) {
       // COLMAP takes all numbers below 1 for all cores.
       if (row.name == "FeatureMatching.num_threads" && text == std::string("-2")) continue;
       EXPECT_FALSE(row.read(text)) << row.name << " \"" << text << "\"";
+    }
+  }
+}
+
+// What shells complete.
+TEST(OptionTable, TellsChoicesAndPaths) {
+  CommandLine line;
+  for (const OptionRow& row : MakeOptionTable(&line)) {
+    const bool is_choice = row.values.find("one of") == 0 || row.values == "0 or 1";
+    EXPECT_EQ(!row.choices.empty(), is_choice) << row.name;
+    if (row.values.find("path") != std::string::npos) {
+      EXPECT_NE(row.path, OptionRow::Path::kNone) << row.name;
+      const bool is_directory = row.values.find("directory") != std::string::npos;
+      EXPECT_EQ(row.path == OptionRow::Path::kDirectory, is_directory) << row.name;
     }
   }
 }

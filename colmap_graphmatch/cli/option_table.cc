@@ -66,6 +66,10 @@ std::optional<T> Number(const std::string& text) {
                                                              : std::nullopt;
 }
 
+bool EndsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
 std::string Text(double value) { return fmt::format("{}", value); }
 
 // What an option may be, in words and as a function that stores it.
@@ -73,18 +77,24 @@ struct Value {
   std::string values;
   std::string default_value;
   std::function<bool(const std::string&)> read;
+  std::vector<std::string> choices = {};
+  OptionRow::Path path = OptionRow::Path::kNone;
 };
+
+const std::vector<std::string> kBoolChoices = {"0", "1"};
 
 Value Flag(bool* field) {
   return {"", "", [field](const std::string&) { return *field = true; }};
 }
 
 Value BoolOf(bool* field) {
-  return {"0 or 1", *field ? "1" : "0", [field](const std::string& text) {
+  return {"0 or 1", *field ? "1" : "0",
+          [field](const std::string& text) {
             const std::optional<bool> value = ParseBool(text);
             if (value) *field = *value;
             return value.has_value();
-          }};
+          },
+          kBoolChoices};
 }
 
 Value IntOf(int* field, int minimum, int maximum = std::numeric_limits<int>::max()) {
@@ -152,11 +162,15 @@ Value DoubleOf(double* field, Zero zero) {
 
 // std::string or a path.
 template <typename T>
-Value TextOf(T* field, const std::string& values) {
-  return {values, std::string(*field), [field](const std::string& text) {
+Value TextOf(T* field, const std::string& values, OptionRow::Path path = OptionRow::Path::kFile) {
+  return {values,
+          std::string(*field),
+          [field](const std::string& text) {
             *field = text;
             return !text.empty();
-          }};
+          },
+          {},
+          path};
 }
 
 template <typename Enum>
@@ -165,6 +179,7 @@ Value OneOf(Enum* field, const Names<Enum>& names) {
   for (const auto& [name, entry] : names) {
     if (entry == *field) value.default_value = name;
     value.values += (value.values.empty() ? "one of " : ", ") + name;
+    value.choices.push_back(name);
   }
   value.read = [field, &names](const std::string& text) {
     const auto found = names.find(text);
@@ -177,10 +192,14 @@ Value OneOf(Enum* field, const Names<Enum>& names) {
 // Nothing is as good as not given.
 template <typename T>
 Value TextOrNothingOf(T* field, const std::string& values) {
-  return {values + ", or nothing", "", [field](const std::string& text) {
+  return {values + ", or nothing",
+          "",
+          [field](const std::string& text) {
             *field = text;
             return true;
-          }};
+          },
+          {},
+          OptionRow::Path::kFile};
 }
 
 Value Anything() {
@@ -214,6 +233,8 @@ class Table {
     row.values = std::move(value.values);
     row.default_value = std::move(value.default_value);
     row.read = std::move(value.read);
+    row.choices = std::move(value.choices);
+    row.path = value.path;
     row.help = help;
     row.names = {name};
     rows_.push_back(std::move(row));
@@ -266,7 +287,9 @@ class Table {
       if (value) *text = *value ? "1" : "0";
       return value.has_value();
     };
-    return AddPassedOn(std::move(colmap), check, "0 or 1", help);
+    OptionRow& row = AddPassedOn(std::move(colmap), check, "0 or 1", help);
+    row.choices = kBoolChoices;
+    return row;
   }
 
   OptionRow& PassInt(std::vector<ColmapSpelling> colmap, int minimum, const std::string& help) {
@@ -301,7 +324,8 @@ class Table {
   }
 
   void AddUnused(std::vector<ColmapSpelling> colmap, const std::string& why) {
-    AddColmap(Use::kUnused, std::move(colmap), Anything(), why);
+    OptionRow& row = AddColmap(Use::kUnused, std::move(colmap), Anything(), why);
+    if (EndsWith(row.name, "_path")) row.path = OptionRow::Path::kFile;
   }
 
   void AddGeneral();
@@ -330,7 +354,7 @@ void Table::AddGeneral() {
   AddColmap(Use::kHere, {{{3, 8}, "project_path", ""}},
             TextOf(&line_->project_path, "the path of a file"),
             "an ini file with options, as COLMAP writes it; the command line goes before");
-  Add("colmap_path", TextOf(&p.colmap_path, "a path, or a name on PATH"),
+  Add("colmap_path", TextOf(&p.colmap_path, "a path, or a name on PATH", OptionRow::Path::kProgram),
       "the COLMAP program: a path, or a name on PATH");
   AddColmap(
       Use::kHere, {{{3, 8}, "random_seed", "0"}, {{3, 13}, "default_random_seed", "0"}},
@@ -409,7 +433,8 @@ void Table::AddVectors() {
   Add("GraphMatching.descriptor", OneOf(&vectors.descriptor, kDescriptors),
       "what describes an image: Fisher vectors of its features; for comparison VLAD of them, GIST "
       "of the photo, or vectors of another program from a file");
-  Add("image_path", TextOf(&vectors.image_path, "the path of a directory"),
+  Add("image_path",
+      TextOf(&vectors.image_path, "the path of a directory", OptionRow::Path::kDirectory),
       "the directory of the photos: for the descriptor gist, and to show photos in the report");
   Add("GraphMatching.vectors_path", TextOf(&vectors.vectors_path, "the path of a .npy file"),
       "for the descriptor file: a NumPy array, a row of float32 or float64 for each image; the "
@@ -461,7 +486,8 @@ void Table::AddWork() {
       "seconds (> 0) a pair after which COLMAP counts as hanging");
   Add("GraphMatching.lock_timeout", DoubleOf(&p.verification.lock_timeout, Zero::kAllowed),
       "seconds (>= 0) to wait while another program locks the database");
-  Add("GraphMatching.work_path", TextOf(&p.work_path, "the path of a directory"),
+  Add("GraphMatching.work_path",
+      TextOf(&p.work_path, "the path of a directory", OptionRow::Path::kDirectory),
       "where temporary files go (default: $TMPDIR or /tmp); some 100 MB a process");
 }
 
@@ -537,11 +563,13 @@ void Table::AddColmapMatching() {
   AddGrouped(Use::kHere,
              {{{3, 13}, "FeatureMatching.type", "SIFT"},
               {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},
-             {"one of SIFT, SIFT_BRUTEFORCE, SIFT_LIGHTGLUE: only SIFT features are matched", "",
+             {"one of SIFT, SIFT_BRUTEFORCE, SIFT_LIGHTGLUE: only SIFT features are matched",
+              "",
               [line = line_](const std::string& text) {
                 line->lightglue = text == "SIFT_LIGHTGLUE";
                 return line->lightglue || text == "SIFT_BRUTEFORCE" || text == "SIFT";
-              }},
+              },
+              {"SIFT", "SIFT_BRUTEFORCE", "SIFT_LIGHTGLUE"}},
              "how descriptors are matched; SIFT_LIGHTGLUE: by COLMAP 4");
   AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.max_ratio", "0.8"}},
              DoubleOf(&matching.max_ratio, Zero::kNotAllowed),
@@ -601,7 +629,8 @@ void Table::AddColmapMatching() {
              BoolOf(&p.skip_image_pairs_in_same_frame),
              "do not test pairs of images that a rig took at the same time");
   PassShare({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, "score of a match by LightGlue");
-  PassText({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, "the model of LightGlue");
+  PassText({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, "the model of LightGlue").path =
+      OptionRow::Path::kFile;
 }
 
 void Table::AddUnusedOptions() {
@@ -670,6 +699,27 @@ const ColmapSpelling* OptionRow::In(const ColmapVersion& version) const {
     if (!(version < spelling.first)) found = &spelling;
   }
   return found == nullptr || found->name.empty() ? nullptr : found;
+}
+
+std::string OptionRow::ColmapDefaults() const {
+  std::string text = "COLMAP";
+  const ColmapSpelling& oldest = colmap.front();
+  if (ColmapVersion{3, 8} < oldest.first) text += " since " + ToString(oldest.first);
+  if (colmap.back().name.empty()) text += " before " + ToString(colmap.back().first);
+  text += ": " + (oldest.default_value.empty() ? "none" : oldest.default_value);
+  std::string last = oldest.default_value;
+  for (const ColmapSpelling& spelling : colmap) {
+    if (spelling.name.empty() || spelling.default_value == last) continue;
+    last = spelling.default_value;
+    text += "; since " + ToString(spelling.first) + ": " + last;
+  }
+  return text;
+}
+
+std::string WithDashes(const std::string& name) { return (name.size() == 1 ? "-" : "--") + name; }
+
+std::string ToString(const ColmapVersion& version) {
+  return fmt::format("{}.{}", version.major, version.minor);
 }
 
 std::vector<OptionRow> MakeOptionTable(CommandLine* line) { return Table(line).Make(); }

@@ -29,7 +29,8 @@ struct ColmapSpelling {
 };
 
 // Everything there is to know about an option. The command line, project files, what COLMAP is
-// handed, the help and docs/options.md all come from the rows of one table.
+// handed, the help, docs/options.md, the man page and the shells' completions all come from the
+// rows of one table.
 struct OptionRow {
   enum class Use {
     kOwn,       // An option of this program alone,
@@ -37,12 +38,15 @@ struct OptionRow {
     kPassedOn,  // one that goes to the installed COLMAP, in its spelling,
     kUnused,    // one that is accepted and has no meaning without a vocabulary tree.
   };
+  enum class Path { kNone, kFile, kDirectory, kProgram };
 
   std::string section;
   std::string name;  // The spelling that the help shows: for options of COLMAP its newest one.
   Use use = Use::kOwn;
   std::string values;  // What follows "it must be" in the error; empty: a flag without a value.
   std::string default_value;
+  std::vector<std::string> choices;  // All that the value may be, if they can be listed.
+  Path path = Path::kNone;           // What the value is the path of.
   std::string help;
   std::vector<ColmapSpelling> colmap;  // Ascending; empty for options of this program.
 
@@ -56,7 +60,20 @@ struct OptionRow {
 
   // The spelling and default in a version of COLMAP, or null if it has no such option.
   const ColmapSpelling* In(const ColmapVersion& version) const;
+
+  // COLMAP's defaults and since when, for an option that COLMAP has: "COLMAP: 0.25; since 4.2: 0",
+  // "COLMAP since 3.13: 1", "COLMAP before 3.9: 0".
+  std::string ColmapDefaults() const;
+
+  // Whether the help lists the option, and under this one of its names.
+  bool Shows(const std::string& a_name) const { return use != Use::kUnused && a_name == name; }
 };
+
+// "--help", "-h".
+std::string WithDashes(const std::string& name);
+
+// "3.8".
+std::string ToString(const ColmapVersion& version);
 
 // The words for truth that COLMAP understands, in any case (Boost.Program_options' own): true, yes,
 // on, 1 and their opposites.

@@ -33,7 +33,4 @@ CommandLine ParseCommandLine(int argc, const char* const* argv);
 
 void PrintHelp(std::ostream& stream);
 
-// docs/options.md.
-void PrintOptionsDocument(std::ostream& stream);
-
 }  // namespace colmap_graphmatch

@@ -1,9 +1,5 @@
-// The table of options against the world:
-//   option_table document            prints docs/options.md
-//   option_table check VERSION       compares the table with what `colmap vocab_tree_matcher -h` of
-//   that
-//                                    version of COLMAP printed, on the standard input; exit code 1
-//                                    if they differ
+// option_table VERSION: compares the table of options with what `colmap vocab_tree_matcher -h` of
+// that version of COLMAP printed, on the standard input; exit code 1 if they differ.
 
 #include "colmap_graphmatch/cli/option_table.h"
 
@@ -67,19 +63,15 @@ int Check(const ColmapVersion& version, const std::string& help) {
 }
 
 int Main(const std::vector<std::string>& arguments) {
-  if (arguments.size() == 1 && arguments[0] == "document") {
-    PrintOptionsDocument(std::cout);
-    return 0;
-  }
   ColmapVersion version;
   char dot = 0;
-  if (arguments.size() == 2 && arguments[0] == "check" &&
-      std::istringstream(arguments[1]) >> version.major >> dot >> version.minor) {
+  if (arguments.size() == 1 &&
+      std::istringstream(arguments[0]) >> version.major >> dot >> version.minor) {
     const std::string help((std::istreambuf_iterator<char>(std::cin)),
                            std::istreambuf_iterator<char>());
     return Check(version, help);
   }
-  std::cerr << "usage: option_table document | check VERSION" << std::endl;
+  std::cerr << "usage: option_table VERSION" << std::endl;
   return 1;
 }
 
