@@ -6,8 +6,26 @@ endfunction()
 
 file(REMOVE_RECURSE ${WORK_DIR})
 run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/prefix)
+foreach(file man/man1/graphmatch_matcher.1.gz bash-completion/completions/graphmatch_matcher
+        zsh/site-functions/_graphmatch_matcher doc/colmap-graphmatch/README.md doc/colmap-graphmatch/copyright
+        doc/colmap-graphmatch/docs/install.md)
+  if(NOT EXISTS ${WORK_DIR}/prefix/share/${file})
+    message(FATAL_ERROR "share/${file} was not installed")
+  endif()
+endforeach()
+# Any program will do for COLMAP here.
+run(${CMAKE_COMMAND} -E env GRAPHMATCH_COLMAP=true
+    ${WORK_DIR}/prefix/libexec/colmap-graphmatch/colmap vocab_tree_matcher --version)
 run(${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/consumer -G ${GENERATOR}
     -DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix -DCMAKE_BUILD_TYPE=Release)
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/consumer)
 run(${WORK_DIR}/consumer/consumer)
 run(${WORK_DIR}/prefix/bin/graphmatch_matcher --version)
+
+# The program without the libraries, and the libraries without the program.
+run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/runtime --component runtime)
+run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/development --component development)
+if(EXISTS ${WORK_DIR}/runtime/include OR NOT EXISTS ${WORK_DIR}/runtime/bin/graphmatch_matcher
+   OR EXISTS ${WORK_DIR}/development/bin OR EXISTS ${WORK_DIR}/development/share)
+  message(FATAL_ERROR "the components are mixed up")
+endif()
