@@ -299,7 +299,8 @@ class PageTest(unittest.TestCase):
             }''', canvas)
         name = self.text('#tooltip p')
         self.assertIn(name, self.report['image_names'][:30])
-        ActionChains(self.driver).move_to_element_with_offset(canvas, int(hit[0]) + 1, int(hit[1]) + 1).click().perform()
+        x, y = int(hit[0]) + 1, int(hit[1]) + 1
+        ActionChains(self.driver).move_to_element_with_offset(canvas, x, y).click().perform()
         self.assertTrue(self.visible('panel'))
         self.assertIn(self.text('#panel-name'), self.report['image_names'][:30])
         self.press(Keys.ESCAPE)

@@ -366,13 +366,13 @@ const stage = byId('stage');
 const maxBubbles = 300;
 const stageHeight = () => Math.round(Math.max(320, Math.min(620, window.innerHeight * 0.7, stage.clientWidth)));
 
-const degreeOrder = (component) => components[component].reduce((best, image) =>
+const bestConnected = (component) => components[component].reduce((best, image) =>
   (degrees[image] > degrees[best] ? image : best));
 // The best connected image of every component stands for it; one with a thumbnail, if there is any.
 const representatives = components.map((component, i) => {
   const shown = component.filter((image) => image in thumbnails);
   return shown.length ? shown.reduce((best, image) => (degrees[image] > degrees[best] ? image : best)) :
-    degreeOrder(i);
+    bestConnected(i);
 });
 
 function drawOverview() {
@@ -551,7 +551,7 @@ function openComponent(component, selected = -1) {
   const highlighted = all.filter(isHighlighted);
   const backbone = layoutEdges(all, members.length <= 150 ? Infinity : large ? 3 : 6);
   const links = backbone.map(([a, b]) => ({source: local.get(a), target: local.get(b)}));
-  // Four strengths of lines, from the strongest to the threshold, each with as many edges: the ends one after the other.
+  // Four strengths of lines, the strongest first, each with as many edges: their ends one after the other.
   const drawn = (list) => [0, 1, 2, 3].map((quarter) => {
     const ends = [];
     for (const edge of list.slice(quarter * list.length / 4, (quarter + 1) * list.length / 4)) {
@@ -574,8 +574,8 @@ function openComponent(component, selected = -1) {
     plural(all.length, 'edge');
   canvas.setAttribute('aria-label', byId('graph-title').textContent);
   byId('graph-explanation').textContent = 'Dots are images, lines edges: the more inliers, the darker. What matches ' +
-    'well lies close together. A click on an image shows its neighbours; drag to move, turn the wheel to zoom, Escape ' +
-    'goes back.';
+    'well lies close together. A click on an image shows its neighbours; drag to move, turn the wheel to zoom, ' +
+    'Escape goes back.';
   sizeCanvas();
   canvas.focus({preventScroll: true});
 
@@ -966,7 +966,7 @@ function showComponents() {
   }
   listTable(holder, [['Component', true], ['Images', true], ['Edges', true], ['Neighbours an image', true],
     ['Best connected image'], ['']], components, (component, i) => {
-    const best = degreeOrder(i);
+    const best = bestConnected(i);
     return [count(i + 1), count(component.length), count(componentEdges[i]),
       (2 * componentEdges[i] / component.length).toFixed(1), imageWithThumbnail(best),
       element('button', {type: 'button', 'aria-label': `Show component ${i + 1} in the graph`, onclick: () => {
@@ -1151,16 +1151,18 @@ function drawAdjacency() {
   picture.setAttribute('aria-label', 'Pairs of images: edges dark, other tested pairs light');
 
   const readout = byId('adjacency-readout');
-  const rest = binned ? `Each point stands for ${(numImages / cells).toFixed(1)} × ${(numImages / cells).toFixed(1)} ` +
-    'images.' : 'Move over the picture to see which pair is where.';
+  const width = (numImages / cells).toFixed(1);
+  const rest = binned ? `Each point stands for ${width} × ${width} images.` :
+    'Move over the picture to see which pair is where.';
   readout.textContent = rest;
   picture.onmousemove = (event) => {
     const at = (offset) => seriation[Math.min(numImages - 1,
       Math.max(0, Math.floor(offset / picture.clientWidth * numImages)))];
     const [a, b] = [at(event.offsetX), at(event.offsetY)];
     readout.textContent = `${names[a]} and ${names[b]}` + (a === b ? ' (the diagonal)' :
-      neighbours.subarray(firstNeighbour[a], firstNeighbour[a + 1]).includes(b) ? ': an edge' : componentOf[a] === componentOf[b] && componentOf[a] >= 0 ?
-        `: no edge; both in component ${componentOf[a] + 1}` : ': no edge');
+      neighbours.subarray(firstNeighbour[a], firstNeighbour[a + 1]).includes(b) ? ': an edge' :
+        componentOf[a] === componentOf[b] && componentOf[a] >= 0 ?
+          `: no edge; both in component ${count(componentOf[a] + 1)}` : ': no edge');
   };
   picture.onmouseleave = () => { readout.textContent = rest; };
 }
