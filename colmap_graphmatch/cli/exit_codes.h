@@ -2,7 +2,7 @@
 
 namespace colmap_graphmatch {
 
-// Exit codes of graphmatch_matcher, listed in README.md. Whatever the code, all pairs verified
+// Exit codes of graphmatch_matcher, listed in docs/errors.md. Whatever the code, all pairs verified
 // before are in the database.
 enum ExitCode : int {
   kExitSuccess = 0,

@@ -685,7 +685,6 @@ says 0 'The help goes to a full disk' "$nothing" bash -c '"$@" >/dev/full' bash 
 
 # The document with the rows of this run in place of its own.
 header='| What happened | Exit code | Message | How to go on |'
-sed -n -E '/^\| exit code \| meaning/,/^$/{/^\|/p}' "$root/README.md" >"$work/tables/codes"
 while IFS= read -r line; do
   [[ ${inside:-no} == no || $line == '<!-- end of table -->' ]] || continue
   inside=no
@@ -693,8 +692,7 @@ while IFS= read -r line; do
   if [[ $line =~ ^'<!-- table: '([a-z]+)' -->'$ ]]; then
     inside=yes
     table=$work/tables/${BASH_REMATCH[1]}
-    # The exit codes are those of README.md, with its own header.
-    [[ ${BASH_REMATCH[1]} == codes ]] || printf '%s\n|---|---|---|---|\n' "$header"
+    printf '%s\n|---|---|---|---|\n' "$header"
     cat "$table"
     mv "$table" "$table.used"
   fi
