@@ -4,12 +4,14 @@
 #include <cstring>
 #include <exception>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <new>
 #include <string>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/stop_request.h"
+#include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/base/version.h"
 #include "colmap_graphmatch/base/whole_file.h"
 #include "colmap_graphmatch/cli/console.h"
@@ -17,7 +19,9 @@
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/report/exports.h"
+#include "colmap_graphmatch/report/html_report.h"
 #include "colmap_graphmatch/report/json_report.h"
+#include "colmap_graphmatch/report/thumbnails.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -66,9 +70,32 @@ void WarnIfNotWritten(const std::ostream& stream, Console& console) {
                     std::strerror(errno) + ". Nothing else is lost.");
 }
 
+bool IsPage(const std::filesystem::path& path) {
+  return path.extension() == ".html" || path.extension() == ".htm";
+}
+
+// Where the JSON of the report goes: beside the page, if a page is asked for.
+std::filesystem::path JsonPath(std::filesystem::path report_path) {
+  return IsPage(report_path) ? report_path.replace_extension(".json") : report_path;
+}
+
+void WriteReport(const CommandLine& line, const PipelineResult& result) {
+  const std::string json = MakeJsonReport(line.pipeline, result);
+  WriteWholeFile(JsonPath(line.report_path), [&](std::ostream& file) { file << json; });
+  if (!IsPage(line.report_path)) return;
+  std::map<std::size_t, std::string> thumbnails;
+  const std::filesystem::path& image_path = line.pipeline.ranking.vectors.image_path;
+  if (!image_path.empty()) {
+    ThreadPool threads(line.pipeline.num_threads);
+    thumbnails = MakeThumbnails(image_path, ChooseThumbnails(json), threads);
+  }
+  WriteWholeFile(line.report_path,
+                 [&](std::ostream& file) { file << MakeHtmlReport(json, thumbnails); });
+}
+
 // The files that were asked for.
 void WriteFiles(const CommandLine& line, const PipelineResult& result, Console& console) {
-  if (!line.report_path.empty()) WriteJsonReport(line.report_path, line.pipeline, result);
+  if (!line.report_path.empty()) WriteReport(line, result);
   if (!line.pair_list_path.empty() && WritePairList(line.pair_list_path, result)) {
     console.OnWarning("Some names of images have spaces: lines of " + line.pair_list_path.string() +
                       " with such a name have a tab between the names, and COLMAP and hloc cannot "
@@ -82,7 +109,8 @@ int Run(const CommandLine& line, Console& console) {
   for (const std::string& message : line.unused_options) console.OnInfo(message);
   for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
-    for (const auto& path : {line.report_path, line.pair_list_path, line.graph_path}) {
+    for (const auto& path :
+         {line.report_path, JsonPath(line.report_path), line.pair_list_path, line.graph_path}) {
       if (!path.empty()) CheckCanWrite(path);
     }
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
