@@ -15,6 +15,7 @@ namespace colmap_graphmatch {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::ElementsAreArray;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::UnorderedElementsAre;
@@ -54,6 +55,19 @@ TEST_F(BudgetTest, WithoutLimitsEverythingIsTested) {
   EXPECT_EQ(inner_.tested.size(), 100U);
   EXPECT_THAT(inner_.batches, SizeIs(1));
   EXPECT_EQ(verifier.Reached(), BudgetedVerifier::Limit::kNone);
+}
+
+TEST_F(BudgetTest, ABatchThatIsNotCutIsPassedOnWithWhatIsKnown) {
+  inner_.known = {ImagePair(1, 3), ImagePair(1, 50)};
+  BudgetedVerifier unlimited = Make({}, LaterIsNearer);
+  EXPECT_TRUE(Verify(&unlimited, Pairs(100)));
+  EXPECT_THAT(inner_.batches, ElementsAre(Pairs(100)));
+  TestBudget budget;
+  budget.max_pairs = 98;
+  BudgetedVerifier just_enough = Make(budget, LaterIsNearer);
+  EXPECT_TRUE(Verify(&just_enough, Pairs(100)));
+  EXPECT_THAT(inner_.batches.back(), ElementsAreArray(Pairs(100)));
+  EXPECT_FALSE(Verify(&just_enough, {ImagePair(7, 8)}));
 }
 
 TEST_F(BudgetTest, TheMostPromisingPairsOfABatchThatIsTooLarge) {
@@ -157,6 +171,16 @@ TEST(RunRecord, ALongCurveKeepsItsEndsAndThoseOfItsBatches) {
     EXPECT_EQ(tests.count(wanted), 1U) << wanted;
   }
   EXPECT_THAT(record.Tested(), SizeIs(kNum));
+}
+
+TEST(RunRecord, ManySmallBatches) {
+  RunRecord record;
+  for (std::size_t i = 1; i <= 300000; ++i) {
+    record.Add(Progress(LoopStage::kPropagation, static_cast<int>(i), i, 0), 1);
+  }
+  EXPECT_LE(record.Discovery().size(), RunRecord::kMaxPoints + 1);
+  EXPECT_GE(record.Discovery().size(), RunRecord::kMaxPoints / 4);
+  EXPECT_EQ(record.Discovery().back().num_tested, 300000U);
 }
 
 TEST(RunRecord, KnownPairsOfImagesThatAreGoneAreLeftOut) {

@@ -272,27 +272,58 @@ TEST(RecentRate, IsThatOfTheLastHalfMinuteOrSo) {
   EXPECT_NEAR(rate.At(630.4), 10 * std::exp(-1), 0.1);
 }
 
-TEST(TimeLeft, CountsSamplesAtTheirOwnRate) {
-  TimeLeft left;
-  LoopProgress progress;
-  double seconds = 0;
-  EXPECT_LT(left.At(0), 0);
-  left.Update(0, progress);
-  // Sampling tests 100 pairs a second, propagation 10; for a minute, and in turns of 4 seconds.
-  for (int i = 0; i < 60; ++i) {
-    progress.stage = i / 4 % 2 == 0 ? LoopStage::kSampling : LoopStage::kPropagation;
-    progress.all.num_tested += progress.stage == LoopStage::kSampling ? 100 : 10;
-    progress.expected_remaining_tests = 1100;
-    progress.expected_remaining_samples = 1000;
-    left.Update(++seconds, progress);
-    // As long as only one of the rates is known it is that of both.
-    if (i == 2) {
-      EXPECT_NEAR(left.At(seconds), 11, 1e-6);
+// Feeds the progress of batches of 100 pairs that take some seconds each.
+class TimeLeftTest : public ::testing::Test {
+ protected:
+  void Test(LoopStage stage, int iteration, double seconds) {
+    if (!begun_) left_.Update(0, progress_);
+    begun_ = true;
+    progress_.stage = stage;
+    progress_.iteration = iteration;
+    for (int i = 0; i < 100; ++i) {
+      ++progress_.all.num_tested;
+      left_.Update(seconds_ += seconds / 100, progress_);
     }
   }
-  EXPECT_NEAR(left.At(seconds), 1000 / 100.0 + 100 / 10.0, 1e-6);
-  // Nothing comes any more.
-  EXPECT_GT(left.At(seconds + 30), 25);
+
+  double Left(std::size_t num_samples, std::size_t num_others) {
+    progress_.expected_remaining_samples = num_samples;
+    progress_.expected_remaining_tests = num_samples + num_others;
+    left_.Update(seconds_, progress_);
+    return left_.At(seconds_);
+  }
+
+  TimeLeft left_;
+  LoopProgress progress_;
+  double seconds_ = 0;
+  bool begun_ = false;
+};
+
+TEST_F(TimeLeftTest, IsNotKnownBeforeTheFirstTest) { EXPECT_LT(left_.At(0), 0); }
+
+TEST_F(TimeLeftTest, AsLongAsThereIsOneStageItsRateIsThatOfAll) {
+  Test(LoopStage::kSampling, 0, 10);
+  EXPECT_NEAR(Left(200, 100), 30, 1e-6);
+}
+
+TEST_F(TimeLeftTest, SamplesGetCheaperAsTheyDidLast) {
+  Test(LoopStage::kSampling, 0, 10);
+  Test(LoopStage::kPropagation, 0, 20);
+  Test(LoopStage::kSampling, 1, 8);
+  Test(LoopStage::kPropagation, 1, 20);
+  // Three iterations of 100 samples at 0.8, 0.64 and 0.512 of 8 seconds.
+  EXPECT_NEAR(Left(300, 100), 8 * (0.8 + 0.64 + 0.512) + 20, 1e-6);
+  // If they get dearer, that is not taken to go on, and nothing is more than halved.
+  Test(LoopStage::kSampling, 2, 16);
+  EXPECT_NEAR(Left(300, 0), 48, 1e-6);
+  Test(LoopStage::kSampling, 3, 1);
+  EXPECT_NEAR(Left(100, 0), 0.5, 1e-6);
+}
+
+TEST_F(TimeLeftTest, WhatDoesNotComeTakesLonger) {
+  Test(LoopStage::kPropagation, 0, 10);
+  const double now = Left(0, 100);
+  EXPECT_GT(left_.At(seconds_ + 30), 2 * now);
 }
 
 ProgressView MakeView(std::size_t scale) {

@@ -275,9 +275,7 @@ TEST_F(ReplayTest, TheLogHasEveryTest) {
 
 TEST_F(ReplayTest, TheReportSaysWhatWasFound) {
   const PipelineResult result = Run();
-  const std::filesystem::path path = directory_.Path() / "report.json";
-  WriteJsonReport(path, options_, result);
-  const nlohmann::json report = nlohmann::json::parse(ReadFile(path));
+  const nlohmann::json report = nlohmann::json::parse(MakeJsonReport(options_, result));
   EXPECT_EQ(report["schema"], "graphmatch-report");
   EXPECT_EQ(report["version"], 1);
   EXPECT_EQ(report["strategy"], "graphmatch");
@@ -293,8 +291,6 @@ TEST_F(ReplayTest, TheReportSaysWhatWasFound) {
                  iteration["propagation"]["tested"].get<std::size_t>();
   }
   EXPECT_EQ(num_tests, result.matching.graph.NumTested());
-  EXPECT_THROW(WriteJsonReport(directory_.Path() / "none" / "report.json", options_, result),
-               FileError);
 }
 
 TEST_F(ReplayTest, TheReportKnowsEveryImageAndPair) {
@@ -336,7 +332,7 @@ TEST_F(ReplayTest, ABudgetEndsTheRun) {
   EXPECT_FALSE(result.matching.finished);
   EXPECT_EQ(result.stopped_by, PipelineResult::StoppedBy::kMaxPairs);
   EXPECT_EQ(result.matching.All().num_tested, 20U);
-  EXPECT_GT(result.num_expected_tests_left, 10U);
+  EXPECT_GT(result.num_expected_tests_left.value_or(0), 10U);
   // The most promising first: nearly all are edges.
   EXPECT_GE(result.matching.graph.NumEdges(), 18U);
 

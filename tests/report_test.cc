@@ -141,13 +141,14 @@ class ThumbnailsTest : public ::testing::Test {
 
   std::map<std::size_t, std::string> Make(const Images& images, int num_threads = 2) const {
     ThreadPool threads(num_threads);
-    return MakeThumbnails(directory_.Path(), images, threads);
+    return MakeThumbnails(directory_.Path(), images, threads, stop_);
   }
 
   static cv::Mat Decode(const std::string& jpeg) {
     return cv::imdecode(std::vector<unsigned char>(jpeg.begin(), jpeg.end()), cv::IMREAD_COLOR);
   }
 
+  StopRequest stop_;
   TestDirectory directory_;
 };
 

@@ -19,6 +19,8 @@ struct VerifiedPair {
   ImagePair pair;
   PairOutcome outcome = PairOutcome::kNoEdge;
   std::uint32_t num_inliers = 0;
+  // Of descriptors, before geometric verification; negative: not known.
+  std::int32_t num_matches = -1;
 };
 
 // The geometric verification of image pairs, as the sample-and-propagate loop sees it

@@ -132,8 +132,11 @@ std::string FormatStoppedBy(const PipelineOptions& options, const PipelineResult
       limit = fmt::format("by max_minutes = {:g}", options.budget.max_minutes);
       break;
   }
-  return fmt::format("Stopped            {}; about {} more tests were to come\n", limit,
-                     result.num_expected_tests_left);
+  const std::string left =
+      result.num_expected_tests_left
+          ? fmt::format("about {} more tests were to come", *result.num_expected_tests_left)
+          : std::string("before the first test");
+  return fmt::format("Stopped            {}; {}\n", limit, left);
 }
 
 }  // namespace
@@ -159,6 +162,8 @@ class Console::TerminalSink : public spdlog::sinks::base_sink<spdlog::details::n
     columns_ = size.columns;
     block_ = FormatBlock(view, size.columns - 1);
     block_.resize(std::min(block_.size(), size.rows - 1));
+    // Fields that are wider than the terminal are not wrapped, and must not count as if they were.
+    for (std::string& line : block_) line.resize(std::min(line.size(), size.columns - 1));
     Write(back + Block());
   }
 
@@ -243,6 +248,8 @@ std::unique_ptr<spdlog::logger> MakeFileLog(std::filesystem::path path) {
   auto log = std::make_unique<spdlog::logger>("file", std::move(sink));
   log->set_pattern(kPattern);
   log->flush_on(spdlog::level::info);
+  // A full disk under the log changes nothing else, and spdlog's own words would go into the block.
+  log->set_error_handler([](const std::string&) {});
   return log;
 }
 
@@ -328,7 +335,8 @@ void Console::Log(int level, const std::string& message, bool on_terminal) {
 }
 
 void Console::LogStage() {
-  if (options_.verbosity < 1) return;
+  // Files of options that COLMAP 3.8 writes have 2.
+  if (options_.verbosity < 3) return;
   const ProgressView view = View(0);
   Log(spdlog::level::info, fmt::format("{} ended: {} pairs tested, {} edges",
                                        StageTitle(progress_.stage, progress_.iteration),
@@ -341,7 +349,9 @@ void Console::Watch() {
     if (interrupted_ && !said_interrupted_) {
       said_interrupted_ = true;
       Log(spdlog::level::info,
-          "Stopping after the pairs that COLMAP is working on; once more gives them up.");
+          has_progress_
+              ? "Stopping after the pairs that COLMAP is working on; once more gives them up."
+              : "Stopping.");
     }
     if (!has_progress_) continue;
     const double seconds = Seconds();
@@ -358,17 +368,23 @@ void Console::LogProgressIfDue(double seconds) {
                    : next_logged_ == 5 ? kLogInterval
                                        : next_logged_ + kLogInterval;
   }
-  Log(spdlog::level::info, FormatProgress(View(seconds)), !has_block_);
+  Log(spdlog::level::info, FormatProgress(View(seconds)), !has_block_ || !OwnsScreen());
 }
 
 void Console::Draw(double seconds) {
   if (!has_block_) return;
   if (continued_.exchange(false)) sink_->LeaveBlock();
-  // In the background the screen is another program's.
-  if (::tcgetpgrp(::fileno(stream_)) != ::getpgrp()) return;
+  if (!OwnsScreen()) return;
   sink_->ShowBlock(View(seconds));
   last_drawn_ = seconds;
   is_drawn_current_ = true;
+}
+
+// In the background the screen is another program's. A terminal that is not the one that controls
+// this process (after setsid) has nobody else.
+bool Console::OwnsScreen() const {
+  const pid_t foreground = ::tcgetpgrp(::fileno(stream_));
+  return foreground == ::getpgrp() || foreground < 0;
 }
 
 double Console::Seconds() const {

@@ -52,6 +52,7 @@ class Console : public PipelineObserver {
   void Watch();
   void Log(int level, const std::string& message, bool on_terminal = true);
   void LogProgressIfDue(double seconds);
+  bool OwnsScreen() const;
   void LogStage();
   void Draw(double seconds);
   double Seconds() const;  // Since the first answer.
@@ -81,6 +82,7 @@ class Console : public PipelineObserver {
 
   std::atomic<bool> interrupted_{false};
   std::atomic<bool> continued_{false};
+  static_assert(std::atomic<bool>::is_always_lock_free);
   std::thread watcher_;
 };
 

@@ -11,7 +11,7 @@ struct LogOptions {
   Target target = Target::kStderrAndFile;
   std::filesystem::path path;  // A file, appended to, or a directory; empty: no file.
   int severity = 0;            // The least one that is logged: 0 info, 1 warnings, 2 and 3 errors.
-  int verbosity = 0;           // From 1 on every stage of every iteration has a line.
+  int verbosity = 0;           // From 3 on every stage of every iteration has a line.
   bool color = true;           // On a terminal, unless NO_COLOR is set.
   bool quiet = false;          // No progress, and no severity below warnings.
 };

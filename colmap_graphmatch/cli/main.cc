@@ -28,6 +28,7 @@ namespace {
 
 StopRequest stop_request;
 std::atomic<Console*> signalled_console{nullptr};
+static_assert(std::atomic<Console*>::is_always_lock_free);
 
 void HandleSignal(int signal) {
   Console* console = signalled_console;
@@ -70,32 +71,34 @@ void WarnIfNotWritten(const std::ostream& stream, Console& console) {
                     std::strerror(errno) + ". Nothing else is lost.");
 }
 
-bool IsPage(const std::filesystem::path& path) {
-  return path.extension() == ".html" || path.extension() == ".htm";
-}
-
-// Where the JSON of the report goes: beside the page, if a page is asked for.
-std::filesystem::path JsonPath(std::filesystem::path report_path) {
-  return IsPage(report_path) ? report_path.replace_extension(".json") : report_path;
-}
-
-void WriteReport(const CommandLine& line, const PipelineResult& result) {
-  const std::string json = MakeJsonReport(line.pipeline, result);
-  WriteWholeFile(JsonPath(line.report_path), [&](std::ostream& file) { file << json; });
-  if (!IsPage(line.report_path)) return;
-  std::map<std::size_t, std::string> thumbnails;
+// The photos that the page shows, as far as they can be read.
+std::map<std::size_t, std::string> FindPhotos(const CommandLine& line, const std::string& json,
+                                              Console& console) {
   const std::filesystem::path& image_path = line.pipeline.ranking.vectors.image_path;
-  if (!image_path.empty()) {
-    ThreadPool threads(line.pipeline.num_threads);
-    thumbnails = MakeThumbnails(image_path, ChooseThumbnails(json), threads);
+  if (image_path.empty()) return {};
+  ThreadPool threads(line.pipeline.num_threads);
+  const auto wanted = ChooseThumbnails(json);
+  auto thumbnails = MakeThumbnails(image_path, wanted, threads, stop_request);
+  if (thumbnails.size() < wanted.size() && !stop_request.Requested()) {
+    console.OnWarning(std::to_string(wanted.size() - thumbnails.size()) + " of " +
+                      std::to_string(wanted.size()) + " photos could not be read in " +
+                      image_path.string() + " and are not in the report.");
   }
+  return thumbnails;
+}
+
+void WriteReport(const CommandLine& line, const PipelineResult& result, Console& console) {
+  const std::string json = MakeJsonReport(line.pipeline, result);
+  WriteWholeFile(JsonReportPath(line.report_path), [&](std::ostream& file) { file << json; });
+  if (!IsPage(line.report_path)) return;
+  const auto photos = FindPhotos(line, json, console);
   WriteWholeFile(line.report_path,
-                 [&](std::ostream& file) { file << MakeHtmlReport(json, thumbnails); });
+                 [&](std::ostream& file) { file << MakeHtmlReport(json, photos); });
 }
 
 // The files that were asked for.
 void WriteFiles(const CommandLine& line, const PipelineResult& result, Console& console) {
-  if (!line.report_path.empty()) WriteReport(line, result);
+  if (!line.report_path.empty()) WriteReport(line, result, console);
   if (!line.pair_list_path.empty() && WritePairList(line.pair_list_path, result)) {
     console.OnWarning("Some names of images have spaces: lines of " + line.pair_list_path.string() +
                       " with such a name have a tab between the names, and COLMAP and hloc cannot "
@@ -109,8 +112,8 @@ int Run(const CommandLine& line, Console& console) {
   for (const std::string& message : line.unused_options) console.OnInfo(message);
   for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
-    for (const auto& path :
-         {line.report_path, JsonPath(line.report_path), line.pair_list_path, line.graph_path}) {
+    for (const auto& path : {line.report_path, JsonReportPath(line.report_path),
+                             line.pair_list_path, line.graph_path}) {
       if (!path.empty()) CheckCanWrite(path);
     }
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);

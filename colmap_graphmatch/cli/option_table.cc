@@ -397,7 +397,8 @@ void Table::AddGraph() {
       "pairs (>= 0) that the run may test, the most promising of each batch first; a later run "
       "goes on; 0: no limit");
   Add("GraphMatching.max_minutes", DoubleOf(&p.budget.max_minutes, Zero::kAllowed),
-      "minutes (>= 0) that the run may take, pre-processing included; 0: no limit");
+      "minutes (>= 0) after which no pair is tested any more, counted from the start; ranking the "
+      "images is not cut short; 0: no limit");
   Add("GraphMatching.dry_run", BoolOf(&p.dry_run),
       "only rank the images: the first candidates are counted, and written by export_pairs; "
       "nothing "
@@ -529,13 +530,13 @@ void Table::AddLog() {
             "of progress on a terminal and the summary stay");
   AddColmap(Use::kHere, {{{3, 8}, "log_level", "2"}, {{3, 9}, "log_level", "0"}},
             IntOf(&log.verbosity, 0),
-            "how much is logged; from 1 on every stage of every iteration has a line");
+            "how much is logged; from 3 on every stage of every iteration has a line");
   AddColmap(Use::kHere, {{{4, 0}, "log_target", "stderr_and_file"}},
             OneOf(&log.target, kLogTargets),
             "where the log goes: the standard error output, and with log_path that file. Errors "
             "that end the program are on the standard error output in any case");
   AddColmap(Use::kHere, {{{4, 0}, "log_path", ""}},
-            TextOrNothingOf(&log.path, "the path of a file or a directory"),
+            TextOrNothingOf(&log.path, "the path of a file, or of where it goes"),
             "the file to which the log is appended; of a directory graphmatch_matcher.log in it");
   AddColmap(Use::kHere,
             {{{3, 8}, "log_to_stderr", "0"}, {{3, 9}, "log_to_stderr", "1"}, {{4, 0}, "", ""}},

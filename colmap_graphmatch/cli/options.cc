@@ -19,6 +19,8 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/cli/option_table.h"
+#include "colmap_graphmatch/database/state_file.h"
+#include "colmap_graphmatch/report/json_report.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -136,6 +138,46 @@ class Parser {
   }
 
  private:
+  // A file that is written may be neither one that is read nor another one that is written: a
+  // database in the place of which there is a list of pairs is lost.
+  void CheckThatFilesDiffer() const {
+    const PipelineOptions& p = line_->pipeline;
+    const ImageRankingOptions& ranking = p.ranking;
+    using File = std::pair<const char*, std::filesystem::path>;
+    const std::vector<File> read = {
+        {"--database_path", p.database_path},
+        {"--database_path with .graphmatch", StateFile::PathFor(p.database_path)},
+        {"--project_path", line_->project_path},
+        {"--GraphMatching.match_list_path", p.match_list_path},
+        {"--VocabTreeMatching.match_list_path", p.image_list_path},
+        {"--GraphMatching.replay_path", p.replay_path},
+        {"--GraphMatching.ranking_path", ranking.ranking_path},
+        {"--GraphMatching.vectors_path", ranking.vectors.vectors_path}};
+    std::vector<File> written = {{"--GraphMatching.report", line_->report_path},
+                                 {"--GraphMatching.export_pairs", line_->pair_list_path},
+                                 {"--GraphMatching.export_graph", line_->graph_path},
+                                 {"--GraphMatching.test_log", p.test_log_path},
+                                 {"--GraphMatching.export_vectors", ranking.export_path},
+                                 {"--log_path", line_->log.path}};
+    if (IsPage(line_->report_path)) {
+      written.emplace_back("--GraphMatching.report with .json", JsonReportPath(line_->report_path));
+    }
+    const auto check = [](const File& file, const File& other) {
+      if (file.second.empty() || other.second.empty()) return;
+      std::error_code ignored;
+      const bool is_same = std::filesystem::equivalent(file.second, other.second, ignored) ||
+                           std::filesystem::weakly_canonical(file.second, ignored) ==
+                               std::filesystem::weakly_canonical(other.second, ignored);
+      if (!is_same) return;
+      throw OptionsError(std::string(file.first) + " and " + other.first + " are the same file, " +
+                         file.second.string() + ": one would take the place of the other.");
+    };
+    for (std::size_t i = 0; i < written.size(); ++i) {
+      for (const File& other : read) check(written[i], other);
+      for (std::size_t j = 0; j < i; ++j) check(written[i], written[j]);
+    }
+  }
+
   void CheckOutputs() {
     PipelineOptions& p = line_->pipeline;
     const auto& graph = line_->graph_path;
@@ -145,11 +187,17 @@ class Parser {
           "--GraphMatching.report, --GraphMatching.export_graph or --GraphMatching.test_log to "
           "tell. --GraphMatching.export_pairs writes the candidates.");
     }
+    const auto& photos = p.ranking.vectors.image_path;
+    if (!photos.empty() && !std::filesystem::is_directory(photos)) {
+      throw OptionsError("--image_path is " + photos.string() +
+                         ", and there is no such directory.");
+    }
     const std::string ending = graph.extension().string();
     if (!graph.empty() && ending != ".graphml" && ending != ".dot" && ending != ".gv") {
       throw OptionsError("--GraphMatching.export_graph is " + graph.string() +
                          "; it must end in .graphml, or in .dot or .gv for Graphviz.");
     }
+    CheckThatFilesDiffer();
     p.keep_details =
         !line_->report_path.empty() || !line_->pair_list_path.empty() || !graph.empty();
   }

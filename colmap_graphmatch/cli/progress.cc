@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "colmap_graphmatch/pipeline/test_log.h"
-
 namespace colmap_graphmatch {
 namespace {
 
@@ -79,30 +77,62 @@ double RecentRate::At(double seconds) const {
 }
 
 void TimeLeft::Update(double seconds, const LoopProgress& progress) {
-  Part& part = progress.stage == LoopStage::kSampling ? sampling_ : others_;
-  if (begun_) part.seconds += seconds - last_;
-  part.num_tested += progress.all.num_tested - progress_.all.num_tested;
-  part.rate.Update(part.seconds, part.num_tested);
+  const double elapsed = begun_ ? seconds - last_ : 0;
+  const std::size_t num_tested = progress.all.num_tested - progress_.all.num_tested;
+  if (progress.stage == LoopStage::kSampling) {
+    if (sampling_.empty() || sampling_.back().iteration != progress.iteration) {
+      sampling_.push_back({progress.iteration, 0, 0});
+      if (sampling_.size() > 3) sampling_.erase(sampling_.begin());
+    }
+    sampling_.back().seconds += elapsed;
+    sampling_.back().num_tested += num_tested;
+  } else {
+    seconds_of_others_ += elapsed;
+    num_others_ += num_tested;
+    others_.Update(seconds_of_others_, num_others_);
+  }
   begun_ = true;
   last_ = seconds;
   progress_ = progress;
 }
 
-double TimeLeft::RateAt(double seconds, bool of_sampling) const {
-  const Part& part = of_sampling ? sampling_ : others_;
-  // Waiting belongs to the stage that it is in.
-  const bool is_now = of_sampling == (progress_.stage == LoopStage::kSampling);
-  return part.rate.At(part.seconds + (is_now ? seconds - last_ : 0));
+double TimeLeft::SecondsPerSample() const {
+  // A batch that has only begun says little: its first answers come late.
+  std::vector<Batch> batches = sampling_;
+  const auto is_fresh = [&] {
+    return batches.size() > 1 &&
+           2 * batches.back().num_tested < batches[batches.size() - 2].num_tested;
+  };
+  if (is_fresh()) batches.pop_back();
+  if (batches.empty() || batches.back().num_tested == 0) return 0;
+  const Batch& last = batches.back();
+  if (batches.size() < 2) return last.SecondsPerTest();
+  const Batch& before = batches[batches.size() - 2];
+  if (before.num_tested == 0 || before.seconds <= 0) return last.SecondsPerTest();
+  constexpr double kFastestDecay = 0.5;
+  const double ratio =
+      std::clamp(last.SecondsPerTest() / before.SecondsPerTest(), kFastestDecay, 1.0);
+  // The mean of ratio, ratio^2, ... over the iterations to come.
+  const double num_iterations = std::max(static_cast<double>(progress_.expected_remaining_samples) /
+                                             static_cast<double>(last.num_tested),
+                                         1.0);
+  const double mean =
+      ratio == 1 ? 1
+                 : ratio * (1 - std::pow(ratio, num_iterations)) / ((1 - ratio) * num_iterations);
+  return mean * last.SecondsPerTest();
 }
 
 double TimeLeft::At(double seconds) const {
+  const bool samples_now = progress_.stage == LoopStage::kSampling;
+  const double waiting = seconds - last_;
   const auto num_samples = static_cast<double>(progress_.expected_remaining_samples);
   const double num_others = static_cast<double>(progress_.expected_remaining_tests) - num_samples;
-  double of_samples = RateAt(seconds, true);
-  double of_others = RateAt(seconds, false);
-  if (of_samples == 0) of_samples = of_others;
-  if (of_others == 0) of_others = of_samples;
-  return of_samples > 0 ? num_samples / of_samples + num_others / of_others : -1;
+  const double rate = others_.At(seconds_of_others_ + (samples_now ? 0 : waiting));
+  double per_other = rate > 0 ? 1 / rate : 0;
+  double per_sample = SecondsPerSample();
+  if (per_sample == 0) per_sample = per_other;
+  if (per_other == 0) per_other = per_sample;
+  return per_sample > 0 ? num_samples * per_sample + num_others * per_other : -1;
 }
 
 double ProgressView::ShareDone() const {

@@ -29,9 +29,9 @@ class RecentRate {
   double weighted_seconds_ = 0;
 };
 
-// How long the tests to come take, at the recent rates of sampling and of everything else: most
-// pairs that sampling draws late in a run have hardly any matches and take a fraction of the time
-// of others.
+// How long the tests to come take. Samples get cheaper from iteration to iteration, since those
+// that are less alike have fewer matches and need no geometric verification: they are taken to go
+// on as they did in the last two. All other tests are taken at the recent rate of their like.
 class TimeLeft {
  public:
   void Update(double seconds, const LoopProgress& progress);
@@ -40,16 +40,22 @@ class TimeLeft {
   double At(double seconds) const;
 
  private:
-  struct Part {
-    RecentRate rate;  // Over `seconds`.
-    double seconds = 0;
+  // The samples of an iteration.
+  struct Batch {
+    int iteration = -1;
     std::size_t num_tested = 0;
+    double seconds = 0;
+
+    double SecondsPerTest() const { return seconds / static_cast<double>(num_tested); }
   };
 
-  double RateAt(double seconds, bool of_sampling) const;
+  // Of the samples to come, on average; 0 as long as there is no sample.
+  double SecondsPerSample() const;
 
-  Part sampling_;
-  Part others_;
+  std::vector<Batch> sampling_;  // The last three, with that which is tested now.
+  RecentRate others_;            // Over their own seconds.
+  double seconds_of_others_ = 0;
+  std::size_t num_others_ = 0;
   bool begun_ = false;
   double last_ = 0;
   LoopProgress progress_;

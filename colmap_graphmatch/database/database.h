@@ -47,6 +47,8 @@ struct PairRows {
   sqlite::Blob inliers;
   int config = 0;
   std::array<std::optional<sqlite::Blob>, kGeometryColumns.size()> geometry;
+  // Of a pair with too few matches, which are not written: how many there were.
+  std::size_t num_dropped_matches = 0;
 };
 
 // True if COLMAP counts such a pair as an edge of the matching graph: enough inliers, and not

@@ -164,6 +164,22 @@ void CheckInput(const GraphMatchOptions& options, const Ranking& ranking,
 
 }  // namespace
 
+const char* StageName(LoopStage stage) {
+  switch (stage) {
+    case LoopStage::kSampling:
+      return "sampling";
+    case LoopStage::kPropagation:
+      return "propagation";
+    case LoopStage::kRetrieval:
+      return "retrieval";
+    case LoopStage::kExpansion:
+      return "expansion";
+    case LoopStage::kListed:
+      break;
+  }
+  return "listed";
+}
+
 StageStatistics operator+(const StageStatistics& a, const StageStatistics& b) {
   StageStatistics sum;
   sum.num_tested = a.num_tested + b.num_tested;

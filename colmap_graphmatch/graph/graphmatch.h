@@ -17,6 +17,9 @@ namespace colmap_graphmatch {
 // kRetrieval, kExpansion: see retrieval.h.
 enum class LoopStage { kSampling, kPropagation, kListed, kRetrieval, kExpansion };
 
+// The lower-case word for a stage in logs and reports.
+const char* StageName(LoopStage stage);
+
 struct StageStatistics {
   std::size_t num_tested = 0;  // Pairs that the verifier tested in this run.
   std::size_t num_edges = 0;   // Those of them that passed.

@@ -44,14 +44,15 @@ void BudgetedVerifier::SortByPromise(std::vector<ImagePair>* pairs) const {
 
 bool BudgetedVerifier::Verify(const std::vector<ImagePair>& pairs,
                               const std::function<void(const VerifiedPair&)>& on_verified) {
+  // The verifier makes of a whole batch what it would make of it in a run without interruptions.
+  if (budget_.max_pairs == 0 && budget_.max_minutes <= 0) {
+    return verifier_.Verify(pairs, on_verified);
+  }
   std::vector<ImagePair> known;
   std::vector<ImagePair> unknown;
   for (const ImagePair& pair : pairs) {
     (FindPair(KnownPairs(), pair) != nullptr ? known : unknown).push_back(pair);
   }
-  if (!known.empty() && !verifier_.Verify(known, on_verified)) return false;
-  if (unknown.empty()) return true;
-
   const std::size_t num_left =
       budget_.max_pairs > 0 ? budget_.max_pairs - num_tested_ : unknown.size();
   const bool is_cut = unknown.size() > num_left;
@@ -61,9 +62,11 @@ bool BudgetedVerifier::Verify(const std::vector<ImagePair>& pairs,
     std::sort(unknown.begin(), unknown.end());
   }
   const auto count = [&](const VerifiedPair& verified) {
-    ++num_tested_;
+    if (FindPair(KnownPairs(), verified.pair) == nullptr) ++num_tested_;
     on_verified(verified);
   };
+  if (!is_cut && budget_.max_minutes <= 0) return verifier_.Verify(pairs, count);
+  if (!known.empty() && !verifier_.Verify(known, on_verified)) return false;
   if (!unknown.empty() && !VerifyInTime(std::move(unknown), count)) return false;
   if (is_cut) reached_ = Limit::kMaxPairs;
   return !is_cut;

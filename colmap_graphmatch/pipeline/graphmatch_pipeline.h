@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -106,8 +107,9 @@ struct PipelineResult {
   double total_seconds = 0;
 
   StoppedBy stopped_by = StoppedBy::kNothing;
-  // Of a run that was stopped: about how many tests were to come (LoopProgress).
-  std::size_t num_expected_tests_left = 0;
+  // Of a run that was stopped: about how many tests were to come (LoopProgress); nothing if it
+  // stopped before the first one.
+  std::optional<std::size_t> num_expected_tests_left;
 
   // Of a dry run: the pairs that the strategy would draw for each image if none of them matched,
   // but for those tested already; nearest first.

@@ -28,11 +28,16 @@ void RunRecord::Add(const LoopProgress& progress, double seconds) {
   if (point.num_tested % stride_ == 0 || point.num_tested == 1) points_.push_back(point);
   last_ = point;
   if (points_.size() < kMaxPoints) return;
-  stride_ *= 2;
+  if (stride_ <= std::numeric_limits<std::size_t>::max() / 4) stride_ *= 2;
   std::vector<DiscoveryPoint> kept;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const bool is_last = i + 1 == points_.size() || !SameBatch(points_[i], points_[i + 1]);
     if (is_last || i == 0 || points_[i].num_tested % stride_ == 0) kept.push_back(points_[i]);
+  }
+  // So many batches that their ends alone are too many.
+  if (kept.size() > kMaxPoints * 3 / 4) {
+    for (std::size_t i = 0; 2 * i < kept.size(); ++i) kept[i] = kept[2 * i];
+    kept.resize((kept.size() + 1) / 2);
   }
   points_ = std::move(kept);
 }
@@ -75,7 +80,7 @@ std::vector<ImageWithoutEdge> FindImagesWithoutEdge(const std::vector<ImageRecor
                                                     const std::vector<ImageId>& ids,
                                                     std::size_t max_num_candidates) {
   std::map<ImageId, ImageWithoutEdge> alone;
-  for (const ImageRecord& image : images) alone[image.id] = {image.id, {}};
+  for (const ImageRecord& image : images) alone[image.id].image = image.id;
   for (const VerifiedPair& verified : tested) {
     if (verified.outcome != PairOutcome::kEdge) continue;
     alone.erase(verified.pair.id1);
@@ -91,12 +96,16 @@ std::vector<ImageWithoutEdge> FindImagesWithoutEdge(const std::vector<ImageRecor
                                                  static_cast<Vertex>(b - ids.begin())));
   };
   for (const VerifiedPair& verified : tested) {
-    if (verified.outcome == PairOutcome::kFailed) continue;
     for (const auto& [image, other] : {std::make_pair(verified.pair.id1, verified.pair.id2),
                                        std::make_pair(verified.pair.id2, verified.pair.id1)}) {
       const auto found = alone.find(image);
       if (found == alone.end()) continue;
-      found->second.candidates.push_back({other, distance(verified.pair), verified.num_inliers});
+      if (verified.outcome == PairOutcome::kFailed) {
+        ++found->second.num_failed;
+        continue;
+      }
+      found->second.candidates.push_back(
+          {other, distance(verified.pair), verified.num_inliers, verified.num_matches});
     }
   }
   std::vector<ImageWithoutEdge> result;

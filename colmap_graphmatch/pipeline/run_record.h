@@ -25,9 +25,11 @@ struct ImageWithoutEdge {
     ImageId image = 0;
     double distance = 0;  // Of the ranking; infinite without one.
     std::uint32_t num_inliers = 0;
+    std::int32_t num_matches = -1;  // Negative: not known.
   };
   ImageId image = 0;
   std::vector<Candidate> candidates;  // The nearest tested images, nearest first.
+  std::size_t num_failed = 0;         // Pairs with it on which the verifier failed.
 };
 
 // What reports and exports need to know of a run beyond its sums.

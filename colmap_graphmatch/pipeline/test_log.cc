@@ -20,22 +20,6 @@ std::string CsvField(const std::string& text) {
 
 }  // namespace
 
-const char* StageName(LoopStage stage) {
-  switch (stage) {
-    case LoopStage::kSampling:
-      return "sampling";
-    case LoopStage::kPropagation:
-      return "propagation";
-    case LoopStage::kRetrieval:
-      return "retrieval";
-    case LoopStage::kExpansion:
-      return "expansion";
-    case LoopStage::kListed:
-      break;
-  }
-  return "listed";
-}
-
 TestLog::TestLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images)
     : path_(path), file_(path, std::ios::trunc) {
   for (const ImageRecord& image : images) names_[image.id] = CsvField(image.name);

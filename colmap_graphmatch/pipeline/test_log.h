@@ -12,9 +12,6 @@
 
 namespace colmap_graphmatch {
 
-// The lower-case word for a stage in logs and reports.
-const char* StageName(LoopStage stage);
-
 // Writes every pair that a run tests to a CSV file (docs/formats.md), in the order of the answers.
 class TestLog {
  public:

@@ -1,10 +1,12 @@
 #include "colmap_graphmatch/report/exports.h"
 
 #include <algorithm>
+#include <boost/algorithm/string/replace.hpp>
 #include <boost/graph/adjacency_list.hpp>
 #include <boost/graph/graphml.hpp>
 #include <boost/graph/graphviz.hpp>
 #include <boost/property_map/dynamic_property_map.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -27,11 +29,23 @@ struct EdgeProperties {
 using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS, ImageProperties,
                                     EdgeProperties>;
 
+// What XML and the language of Graphviz can hold: UTF-8 without control characters.
+std::string PrintableName(const std::string& name) {
+  const nlohmann::json text = name;
+  std::string printable =
+      nlohmann::json::parse(text.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace))
+          .get<std::string>();
+  std::replace_if(
+      printable.begin(), printable.end(),
+      [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 0x7F; }, '?');
+  return printable;
+}
+
 Graph MakeGraph(const PipelineResult& result) {
   const std::vector<GraphEdge> edges = EdgesOf(result, ImageIndex(result.images));
   Graph graph(result.images.size());
   for (std::size_t i = 0; i < result.images.size(); ++i) {
-    graph[i] = {result.images[i].id, result.images[i].name, 0};
+    graph[i] = {result.images[i].id, PrintableName(result.images[i].name), 0};
   }
   std::size_t number = 0;
   for (const std::vector<std::size_t>& component : FindComponents(result.images.size(), edges)) {
@@ -80,11 +94,17 @@ bool WritePairList(const std::filesystem::path& path, const PipelineResult& resu
 
 void WriteGraph(const std::filesystem::path& path, const PipelineResult& result) {
   Graph graph = MakeGraph(result);
+  const bool is_dot = path.extension() == ".dot" || path.extension() == ".gv";
+  if (is_dot) {
+    // Boost escapes quotation marks alone.
+    for (std::size_t i = 0; i < boost::num_vertices(graph); ++i) {
+      boost::algorithm::replace_all(graph[i].name, "\\", "\\\\");
+    }
+  }
   boost::dynamic_properties properties;
   properties.property("image_id", boost::get(&ImageProperties::image_id, graph));
   properties.property("component", boost::get(&ImageProperties::component, graph));
   properties.property("inliers", boost::get(&EdgeProperties::inliers, graph));
-  const bool is_dot = path.extension() == ".dot" || path.extension() == ".gv";
   properties.property(is_dot ? "label" : "name", boost::get(&ImageProperties::name, graph));
   WriteWholeFile(path, [&](std::ostream& file) {
     if (is_dot) {

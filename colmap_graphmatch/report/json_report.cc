@@ -1,6 +1,7 @@
 #include "colmap_graphmatch/report/json_report.h"
 
 #include <algorithm>
+#include <boost/algorithm/string/case_conv.hpp>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -8,8 +9,6 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/version.h"
-#include "colmap_graphmatch/base/whole_file.h"
-#include "colmap_graphmatch/pipeline/test_log.h"
 #include "colmap_graphmatch/report/graph_analysis.h"
 #include "colmap_graphmatch/report/matching_graph_view.h"
 
@@ -173,13 +172,16 @@ void AddDetails(const PipelineOptions& options, const PipelineResult& result, Js
   for (const ImageWithoutEdge& image : result.images_without_edge) {
     Json candidates = Json::array();
     for (const ImageWithoutEdge::Candidate& candidate : image.candidates) {
-      candidates.push_back({{"image", index.Of(candidate.image)},
-                            {"distance", Finite(candidate.distance)},
-                            {"inliers", candidate.num_inliers}});
+      candidates.push_back(
+          {{"image", index.Of(candidate.image)},
+           {"distance", Finite(candidate.distance)},
+           {"matches", candidate.num_matches < 0 ? Json(nullptr) : Json(candidate.num_matches)},
+           {"inliers", candidate.num_inliers}});
     }
     const std::size_t place = index.Of(image.image);
     (*report)["images_without_edge"].push_back({{"image", place},
                                                 {"features", result.images[place].num_features},
+                                                {"failed", image.num_failed},
                                                 {"candidates", std::move(candidates)}});
   }
 }
@@ -207,7 +209,10 @@ std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult&
   report["replay"] = result.replayed;
   report["finished"] = matching.finished;
   report["stopped_by"] = StoppedBy(result.stopped_by);
-  if (!matching.finished) report["expected_tests_left"] = result.num_expected_tests_left;
+  if (!matching.finished) {
+    const auto& left = result.num_expected_tests_left;
+    report["expected_tests_left"] = left ? Json(*left) : Json(nullptr);
+  }
   report["strategy"] = Name(options);
   if (!result.listed) {
     report["descriptor"] = DescriptorName(options.ranking);
@@ -243,9 +248,13 @@ std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult&
   return Dump(report);
 }
 
-void WriteJsonReport(const std::filesystem::path& path, const PipelineOptions& options,
-                     const PipelineResult& result) {
-  WriteWholeFile(path, [&](std::ostream& file) { file << MakeJsonReport(options, result); });
+bool IsPage(const std::filesystem::path& report_path) {
+  const std::string ending = boost::algorithm::to_lower_copy(report_path.extension().string());
+  return ending == ".html" || ending == ".htm";
+}
+
+std::filesystem::path JsonReportPath(std::filesystem::path report_path) {
+  return IsPage(report_path) ? report_path.replace_extension(".json") : report_path;
 }
 
 }  // namespace colmap_graphmatch

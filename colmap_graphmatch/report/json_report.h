@@ -11,8 +11,10 @@ namespace colmap_graphmatch {
 // docs/formats.md describes.
 std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult& result);
 
-// Throws FileError if the file cannot be written; then what was there before is still there.
-void WriteJsonReport(const std::filesystem::path& path, const PipelineOptions& options,
-                     const PipelineResult& result);
+// Whether the report at such a path is a page: its name ends in .html or .htm.
+bool IsPage(const std::filesystem::path& report_path);
+
+// Where the object goes: to the path, or if that is a page beside it, with .json instead.
+std::filesystem::path JsonReportPath(std::filesystem::path report_path);
 
 }  // namespace colmap_graphmatch

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -78,12 +79,20 @@ void AddBestConnectedImages(const Json& report, std::size_t num_images, Choice* 
   }
 }
 
+bool StaysBelow(const std::filesystem::path& name) {
+  return name.is_relative() && *name.lexically_normal().begin() != "..";
+}
+
 // Empty if the file cannot be read.
 std::vector<unsigned char> ReadBytes(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return {};
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error || size == 0) return {};
+  std::vector<unsigned char> bytes(size);
   std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  return file ? bytes : std::vector<unsigned char>();
 }
 
 // Decoding JPEG at an eighth of the size takes a fraction of the time. Of a photo that is too small
@@ -136,10 +145,15 @@ std::vector<std::pair<std::size_t, std::string>> ChooseThumbnails(const std::str
 
 std::map<std::size_t, std::string> MakeThumbnails(
     const std::filesystem::path& image_path,
-    const std::vector<std::pair<std::size_t, std::string>>& images, ThreadPool& threads) {
+    const std::vector<std::pair<std::size_t, std::string>>& images, ThreadPool& threads,
+    const StopRequest& stop) {
+  // What is wrong with a photo is told by its absence.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   std::vector<std::string> files(images.size());
   threads.ParallelFor(images.size(), [&](std::size_t i) {
-    files[i] = MakeThumbnail(image_path / std::filesystem::u8path(images[i].second));
+    const std::filesystem::path name = std::filesystem::u8path(images[i].second);
+    if (stop.Requested() || !StaysBelow(name)) return;
+    files[i] = MakeThumbnail(image_path / name);
   });
   std::map<std::size_t, std::string> thumbnails;
   for (std::size_t i = 0; i < images.size(); ++i) {

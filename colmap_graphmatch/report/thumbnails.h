@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 
 namespace colmap_graphmatch {
@@ -21,9 +22,11 @@ std::vector<std::pair<std::size_t, std::string>> ChooseThumbnails(
 
 // JPEG files of at most 128 x 128 pixels of the images (index and name, a path below image_path),
 // by index. The orientation that a camera has noted is honoured. Files that are missing or cannot
-// be decoded are left out.
+// be decoded are left out, and so are those that are not below image_path, whatever their name
+// says: a page may be sent to others. When stop asks for it, all others are left out, too.
 std::map<std::size_t, std::string> MakeThumbnails(
     const std::filesystem::path& image_path,
-    const std::vector<std::pair<std::size_t, std::string>>& images, ThreadPool& threads);
+    const std::vector<std::pair<std::size_t, std::string>>& images, ThreadPool& threads,
+    const StopRequest& stop);
 
 }  // namespace colmap_graphmatch

@@ -275,6 +275,7 @@ std::vector<ShardPair> ColmapVerifier::Match(const std::vector<ImagePair>& pairs
       PairRows rows;
       rows.pair = to_match[i];
       rows.config = unmatched_config_;
+      rows.num_dropped_matches = matches[i].size();
       unmatched.results.push_back(std::move(rows));
     } else {
       const auto* bytes = reinterpret_cast<const std::uint8_t*>(matches[i].data());
@@ -463,7 +464,8 @@ bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
                                     static_cast<std::size_t>(options_.min_num_inliers));
         --num_unanswered;
         on_verified({rows.pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
-                     static_cast<std::uint32_t>(rows.num_inliers)});
+                     static_cast<std::uint32_t>(rows.num_inliers),
+                     static_cast<std::int32_t>(rows.num_matches + rows.num_dropped_matches)});
       }
       for (const auto& [pair, problem] : part.failures) {
         on_warning_("COLMAP failed on the pair \"" + ImageName(pair.id1) + "\" and \"" +

@@ -668,6 +668,15 @@ piece='there is no such file' says 5 'A photo is missing, for GIST' 'name the di
 says 5 'The log of tests cannot be written' 'name another file' "${run[@]}" --GraphMatching.test_log "$work/none/log.csv"
 partial=yes says 5 'The report cannot be written' 'name another file' "${run[@]}" \
   --GraphMatching.report "$work/none/report.json"
+says 5 'The list of edges cannot be written' 'name another file' "${run[@]}" \
+  --GraphMatching.export_pairs "$work/none/pairs.txt"
+says 5 'The graph cannot be written' 'name another file' "${run[@]}" --GraphMatching.export_graph "$work/none/graph.dot"
+says 5 'The log cannot be written' 'name another file' "${run[@]}" --log_path "$work/none/log.txt"
+says 1 'A file to write is the database' 'name another file' "${run[@]}" --GraphMatching.export_pairs "$database"
+says 1 'The log is the database' 'name another file' "${run[@]}" --log_path "$database"
+says 1 'Two files to write are one' 'name another file' "${run[@]}" --GraphMatching.report "$place/run.html" \
+  --GraphMatching.export_pairs "$place/run.json"
+says 1 'There is no directory of photos' 'give the right one' "${run[@]}" --image_path "$place/photos"
 
 theme output
 works_with() {

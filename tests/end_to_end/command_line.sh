@@ -245,7 +245,7 @@ done
 tested_pairs "$work/budget.db" | cmp - "$work/undisturbed.txt"
 cp "$work/untouched.db" "$work/budget.db"
 # Pre-processing alone takes longer.
-expect_exit 0 'Stopped            by max_minutes = 1e-05' "$matcher" --database_path "$work/budget.db" \
+expect_exit 0 'Stopped            by max_minutes = 1e-05; before the first test' "$matcher" --database_path "$work/budget.db" \
   --colmap_path "$fake" --GraphMatching.max_minutes 0.00001
 [[ $(count_tested "$work/budget.db") == 0 ]] || fail "pairs after the time was over"
 
@@ -259,7 +259,9 @@ num=$(sed -n 's/^Candidates  *\([0-9]*\) pairs.*/\1/p' "$work/output.txt")
 [[ $(wc -l <"$work/candidates.txt") == "$num" ]] || fail "not $num candidates"
 expect_exit 0 "Pairs tested       $num of" "$matcher" --database_path "$work/dry.db" --colmap_path "$fake" \
   --GraphMatching.match_list_path "$work/candidates.txt" --GraphMatching.export_pairs "$work/edges.txt" \
-  --GraphMatching.export_graph "$work/graph.dot" --GraphMatching.report "$work/report.json"
+  --GraphMatching.export_graph "$work/graph.dot" --GraphMatching.report "$work/report.html"
+grep -q '"graphmatch-report"' "$work/report.json" || fail "no report beside the page"
+grep -q 'id="report-data"' "$work/report.html" || fail "the page has no data"
 [[ $(wc -l <"$work/edges.txt") == "$(tested_pairs "$work/dry.db" | grep -c '|1$')" ]] || fail "not all edges"
 [[ $(grep -c -e '--' "$work/graph.dot") == "$(wc -l <"$work/edges.txt")" ]] || fail "another graph"
 expect_exit 1 'must end in .graphml' "$matcher" --database_path "$work/dry.db" --colmap_path "$fake" \

@@ -45,6 +45,22 @@ for columns in 60 200; do
   grep -q "$escape\\[32m" "$work/wide$columns.raw" || fail "no colour"
 done
 
+echo "== A terminal that is too narrow for a field"
+for columns in 30 46; do
+  FAKE_COLMAP_DELAY_MS=2 on_terminal 0 "$columns" "narrow$columns"
+  # The lines of the log are wrapped; none is overwritten.
+  tr -d '\n' <"$work/narrow$columns.final" | grep -q 'Learnt a mixture of .*Described 40 images by' ||
+    { cat "$work/narrow$columns.final"; fail "the block is in the log"; }
+  expect_count 0 'images alone' "$work/narrow$columns.final"
+done
+
+echo "== In another process group the terminal is left alone, and the progress is logged"
+cp "$work/untouched.db" "$work/group.db"
+FAKE_COLMAP_DELAY_MS=20 "$python" "$root/tests/support/run_in_terminal.py" 200 "$work/group" \
+  "$BASH" -c 'timeout 300 "$@"; exit $?' bash "$matcher" --database_path "$work/group.db" --colmap_path "$fake"
+expect_count 0 'images alone$' "$work/group.frames"
+grep -q -E '^I.*: [0-9]+ pairs tested' "$work/group.final" || fail "no progress without a block"
+
 echo "== A warning comes above the block"
 FAKE_COLMAP_FAULT=crash FAKE_COLMAP_FAULT_PAIR='1 2' FAKE_COLMAP_DELAY_MS=2 on_terminal 0 200 warning
 expect_count 1 '^W[0-9].* COLMAP failed on the pair' "$work/warning.final"
@@ -77,11 +93,11 @@ expect_count 1 '^E[0-9].*COLMAP fails on every pair' "$work/error.final"
 expect_count 0 'images alone' "$work/error.final"
 
 echo "== Plain lines on a dumb terminal, and where there is none"
-TERM=dumb on_terminal 0 500 dumb --log_level 1
+TERM=dumb on_terminal 0 500 dumb --log_level 3
 if grep -q "$escape" "$work/dumb.raw"; then fail "orders to a dumb terminal"; fi
 expect_count 1 'propagation 1 ended: [0-9]+ pairs tested, [0-9]+ edges' "$work/dumb.final"
 cp "$work/untouched.db" "$work/plain.db"
-"$matcher" --database_path "$work/plain.db" --colmap_path "$fake" --log_level 1 >"$work/plain.stdout" 2>"$work/plain.txt"
+"$matcher" --database_path "$work/plain.db" --colmap_path "$fake" --log_level 3 >"$work/plain.stdout" 2>"$work/plain.txt"
 grep -v -E "$log_line" "$work/plain.txt" && fail "a line that is none of the log"
 expect_count 1 'propagation 1 ended: [0-9]+ pairs tested, [0-9]+ edges' "$work/plain.txt"
 

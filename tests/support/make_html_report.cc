@@ -19,7 +19,8 @@ int main(int argc, char** argv) {
   std::map<std::size_t, std::string> thumbnails;
   if (argc == 4) {
     gm::ThreadPool threads(-1);
-    thumbnails = gm::MakeThumbnails(argv[3], gm::ChooseThumbnails(json), threads);
+    const gm::StopRequest stop;
+    thumbnails = gm::MakeThumbnails(argv[3], gm::ChooseThumbnails(json), threads, stop);
   }
   std::ofstream(argv[2], std::ios::binary) << gm::MakeHtmlReport(json, thumbnails);
   return 0;

@@ -135,7 +135,7 @@ void PrintOptions(std::ostream& stream) {
 void PrintExitStatus(std::ostream& stream) {
   stream << ".SH EXIT STATUS\n";
   const std::vector<std::pair<ExitCode, const char*>> meanings = {
-      {kExitSuccess, "Done; warnings name pairs that COLMAP failed on."},
+      {kExitSuccess, "Done, or the budget is used up; warnings name pairs that COLMAP failed on."},
       {kExitOptions, "An option is wrong."},
       {kExitDatabase,
        "The database is missing, not COLMAP's, damaged, without images or features, or cannot be "
@@ -144,8 +144,8 @@ void PrintExitStatus(std::ostream& stream) {
        "Another program kept the database locked for `--GraphMatching.lock_timeout` seconds."},
       {kExitColmap, "COLMAP is missing, older than 3.8, or fails on everything."},
       {kExitFile,
-       "The directory for temporary files cannot be used, or its disk is full, or a list of pairs "
-       "or images cannot be used."},
+       "The directory for temporary files cannot be used, or its disk is full, or a file cannot be "
+       "read (a list of pairs or images) or written (report, exports, logs)."},
       {kExitInternal, "Out of memory, or a fault of this program."},
       {kExitInterrupted, "Stopped by Ctrl-C, SIGTERM or SIGHUP; the same command goes on."}};
   for (const auto& [code, meaning] : meanings) {
@@ -197,6 +197,10 @@ void PrintManPage(std::ostream& stream, const std::string& date) {
   PrintItem(stream, "`TMPDIR`",
             "The directory for temporary files, unless `--GraphMatching.work_path` names one; "
             "`/tmp` if it is not set.");
+  PrintItem(stream, "`NO_COLOR`", "If it is set and not empty, nothing is printed in colour.");
+  PrintItem(stream, "`TERM`",
+            "With `dumb`, or where the standard error output is no terminal, progress is told in "
+            "lines of the log instead of a block that is redrawn.");
   stream << ".SH FILES\n";
   stream << ".TP\n.I database\n";
   PrintText(stream,
@@ -214,10 +218,14 @@ void PrintManPage(std::ostream& stream, const std::string& date) {
        "graphmatch_matcher --database_path database.db",
        "colmap mapper --database_path database.db --image_path images --output_path sparse"});
   stream << ".PP\n";
-  PrintText(stream, "On four cores, without a GPU, and with what was found in a file:");
+  PrintText(stream, "On four cores, without a GPU, and with a page that shows what was found:");
   PrintCommands(stream, {"graphmatch_matcher --database_path database.db \\",
                          "    --FeatureMatching.num_threads 4 --FeatureMatching.use_gpu 0 \\",
-                         "    --GraphMatching.report report.json"});
+                         "    --image_path images --GraphMatching.report report.html"});
+  stream << ".PP\n";
+  PrintText(stream, "Half an hour at most; the same command then goes on:");
+  PrintCommands(stream, {"graphmatch_matcher --database_path database.db \\",
+                         "    --GraphMatching.max_minutes 30"});
   stream << ".PP\n";
   PrintText(stream, "The pairs of a list, two names a line, instead of those that it would find:");
   PrintCommands(stream, {"graphmatch_matcher --database_path database.db \\",

@@ -977,11 +977,14 @@ function showComponents() {
 }
 
 // Why an image may be alone, what to do about it, and its nearest candidates.
-function explainAlone({image, features, candidates}) {
+function explainAlone({image, features, failed = 0, candidates}) {
   const best = d3.max(candidates, (candidate) => candidate.inliers) || 0;
   const texts = [];
   if (features === 0) {
     texts.push('It has no features: it is blank, blurred or could not be read, and nothing can match it.');
+  } else if (candidates.length === 0 && failed > 0) {
+    texts.push(`COLMAP failed on ${failed === 1 ? 'the pair' : `all ${count(failed)} pairs`} with it that were ` +
+      'tested: see the warnings of the run.');
   } else if (candidates.length === 0) {
     texts.push(report.finished ? 'No pair with it was tested: no list and no stage asked for one.' :
       'No pair with it was tested before the run was stopped. The same command goes on.');
@@ -1253,7 +1256,7 @@ setTimeout(() => {
   performance.mark('all shown');
   document.documentElement.dataset.ready = 'true';
   // What a link to a section wants to show has only now its place.
-  if (/^#[a-z-]+$/.test(location.hash)) document.querySelector(location.hash).scrollIntoView();
+  if (/^#[a-z-]+$/.test(location.hash)) document.querySelector(location.hash)?.scrollIntoView();
 }, 0);
 
 let resized = 0;
