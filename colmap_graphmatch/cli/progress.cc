@@ -46,7 +46,10 @@ int Percent(double share) { return static_cast<int>(100 * share); }
 
 std::string FormatTimeLeft(const ProgressView& view) {
   if (view.seconds_left < 0) return "time left: not known yet";
-  return "about " + FormatDuration(std::ceil(view.seconds_left)) + " left";
+  const double seconds = std::ceil(view.seconds_left);
+  // A guess has no decimals.
+  return "about " + (seconds < 100 ? fmt::format("{:.0f} s", seconds) : FormatDuration(seconds)) +
+         " left";
 }
 
 }  // namespace

@@ -211,11 +211,15 @@ void PrintManPage(std::ostream& stream, const std::string& date) {
             "What a later run needs again: the mixture, the vectors of the images, and where the "
             "run began. It can be deleted while no run is at work.");
   stream << ".SH EXAMPLES\n";
-  PrintText(stream, "From photos to sparse models:");
+  PrintText(
+      stream,
+      "From photos to sparse models (with a GPU and a COLMAP that was built for it, leave out "
+      "`use_gpu`):");
   PrintCommands(
       stream,
-      {"colmap feature_extractor --database_path database.db --image_path images",
-       "graphmatch_matcher --database_path database.db",
+      {"colmap feature_extractor --database_path database.db --image_path images \\",
+       "    --SiftExtraction.use_gpu 0", "graphmatch_matcher --database_path database.db",
+       "mkdir -p sparse",
        "colmap mapper --database_path database.db --image_path images --output_path sparse"});
   stream << ".PP\n";
   PrintText(stream, "On four cores, without a GPU, and with a page that shows what was found:");
