@@ -188,7 +188,8 @@ class Parser {
           "tell. --GraphMatching.export_pairs writes the candidates.");
     }
     const auto& photos = p.ranking.vectors.image_path;
-    if (!photos.empty() && !std::filesystem::is_directory(photos)) {
+    std::error_code ignored;
+    if (!photos.empty() && !std::filesystem::is_directory(photos, ignored)) {
       throw OptionsError("--image_path is " + photos.string() +
                          ", and there is no such directory.");
     }
