@@ -45,9 +45,7 @@ void BudgetedVerifier::SortByPromise(std::vector<ImagePair>* pairs) const {
 bool BudgetedVerifier::Verify(const std::vector<ImagePair>& pairs,
                               const std::function<void(const VerifiedPair&)>& on_verified) {
   // The verifier makes of a whole batch what it would make of it in a run without interruptions.
-  if (budget_.max_pairs == 0 && budget_.max_minutes <= 0) {
-    return verifier_.Verify(pairs, on_verified);
-  }
+  if (budget_.IsUnlimited()) return verifier_.Verify(pairs, on_verified);
   std::vector<ImagePair> known;
   std::vector<ImagePair> unknown;
   for (const ImagePair& pair : pairs) {

@@ -11,7 +11,9 @@ namespace colmap_graphmatch {
 // What a run may spend on tests. 0: without a limit.
 struct TestBudget {
   std::size_t max_pairs = 0;  // That this run tests; known ones cost nothing.
-  double max_minutes = 0;     // Of the whole run, pre-processing included.
+  double max_minutes = 0;     // Since the start of the run, after which nothing is tested.
+
+  bool IsUnlimited() const { return max_pairs == 0 && max_minutes <= 0; }
 
   // Throws OptionsError.
   void Check() const;

@@ -229,8 +229,9 @@ GraphMatchResult FindEdges(const Job& job, PairVerifier& verifier, const OnProgr
     const PairRestrictions restrictions = FindRestrictions(job, job.images);
     const std::vector<ImageId> ids = Ids(job.images);
     const bool all = options.match_list_path.empty();
-    const BudgetedVerifier::Order order =
-        all ? BudgetedVerifier::Order() : OrderOfList(job.listed_pairs);
+    const BudgetedVerifier::Order order = all || options.budget.IsUnlimited()
+                                              ? BudgetedVerifier::Order()
+                                              : OrderOfList(job.listed_pairs);
     GraphMatchResult matching =
         TestWithinBudget(job, verifier, order, result, [&](PairVerifier& budgeted) {
           return all ? VerifyAllPairs(ids, budgeted, on_progress, restrictions)

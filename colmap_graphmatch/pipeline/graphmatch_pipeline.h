@@ -69,7 +69,7 @@ struct PipelineOptions {
   bool dry_run = false;
 
   // Whether the result has images, discovery, tested and images_without_edge, which reports and
-  // exports are made of: some 16 bytes for each tested pair.
+  // exports are made of: some 20 bytes for each tested pair.
   bool keep_details = false;
 
   // Answers pairs from this finished matching graph (see finished_graph.h) instead of having COLMAP

@@ -32,10 +32,10 @@ unwanted=$(grep -E '/include/|\.a$|\.cmake$|/local/| [^ ]*/(test|fake)_' "$work/
 [[ -z $unwanted ]] || fail "in the package, too: $unwanted"
 if grep -v -E '^(drwxr-xr-x|-rwxr-xr-x|-rw-r--r--) root/root ' "$work/contents.txt"; then fail "wrong permissions"; fi
 
-dpkg-deb --extract "$package" "$work/root"
-[[ $(file -b "$work/root/usr/bin/graphmatch_matcher") == *', stripped'* ]] || fail "the program is not stripped"
-[[ $("$work/root/usr/bin/graphmatch_matcher" --version) == "graphmatch_matcher $version" ]] || fail "another version"
-if readelf --dynamic "$work/root/usr/bin/graphmatch_matcher" | grep -E 'RPATH|RUNPATH'; then
+dpkg-deb --extract "$package" "$work/unpacked"
+[[ $(file -b "$work/unpacked/usr/bin/graphmatch_matcher") == *', stripped'* ]] || fail "the program is not stripped"
+[[ $("$work/unpacked/usr/bin/graphmatch_matcher" --version) == "graphmatch_matcher $version" ]] || fail "another version"
+if readelf --dynamic "$work/unpacked/usr/bin/graphmatch_matcher" | grep -E 'RPATH|RUNPATH'; then
   fail "the program looks for libraries where it was built"
 fi
 depends=$(dpkg-deb --field "$package" Depends)
