@@ -6,11 +6,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -484,6 +487,151 @@ TEST_F(DatabaseTest, WaitsForALockAndSaysWhoHoldsIt) {
   ::close(ready[1]);
   database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
   EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 1);
+}
+
+TEST_F(DatabaseTest, AStopRequestEndsTheWaitForALock) {
+  Write();
+  StopRequest stop;
+  Database database(Path(), sqlite::Access::kReadWrite, {60, &stop});
+  sqlite::Connection other(Path(), sqlite::Access::kReadWrite, 1);
+  const auto raise_soon = [&stop] {
+    return std::thread([&stop] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      stop.Raise();
+    });
+  };
+  {
+    const sqlite::Transaction lock(other);
+    std::thread user = raise_soon();
+    EXPECT_THROW(database.CheckWritable(), StoppedError);
+    user.join();
+    // What was computed is given up at the second request only.
+    user = raise_soon();
+    EXPECT_THROW(database.WritePairs({MakeRows(ImagePair(1, 2), 20)}), StoppedError);
+    user.join();
+    EXPECT_TRUE(stop.Abandon());
+  }
+  database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 1);
+}
+
+TEST_F(DatabaseTest, PairsOfOthersAreReportedAsTheyAre) {
+  Write();
+  Database database = Open();
+  EXPECT_THAT(database.WritePairs({MakeRows(ImagePair(1, 2), 20)}), SizeIs(0));
+  const std::vector<TestedPair> of_others =
+      database.WritePairs({MakeRows(ImagePair(1, 2), 5), MakeRows(ImagePair(1, 3), 6)});
+  ASSERT_THAT(of_others, SizeIs(1));
+  EXPECT_EQ(of_others.front().pair, ImagePair(1, 2));
+  EXPECT_EQ(of_others.front().num_inliers, 20U);
+  EXPECT_EQ(of_others.front().config, 3);
+}
+
+class ChangedFeatures : public DatabaseTest {
+ protected:
+  void SetUp() override {
+    Write();
+    database_ = std::make_unique<Database>(Open());
+    const std::vector<ImageRecord> images = database_->ReadImages();
+    database_->ExpectFeatures(images, database_->ReadFingerprints(images));
+  }
+
+  // What writing a pair of images 1 and 2 says after another program executed this.
+  std::string After(const std::string& sql) {
+    Execute(sql);
+    return MessageOf([&] { database_->WritePairs({MakeRows(ImagePair(1, 2), 20)}); });
+  }
+
+  std::unique_ptr<Database> database_;
+};
+
+TEST_F(ChangedFeatures, OfEqualNumberAreNoticed) {
+  database_->WritePairs({MakeRows(ImagePair(1, 3), 20)});
+  EXPECT_THAT(After("UPDATE descriptors SET data = (SELECT data FROM descriptors WHERE image_id = "
+                    "4) WHERE image_id = 2"),
+              AllOf(HasSubstr("place0/photo 1.jpg"), HasSubstr("changed during the run")));
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 1);
+  // Pairs of other images are what they were.
+  database_->WritePairs({MakeRows(ImagePair(3, 4), 20)});
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 2);
+}
+
+TEST_F(ChangedFeatures, OfKeypointsAloneAreNoticed) {
+  EXPECT_THAT(After("UPDATE keypoints SET data = zeroblob(length(data)) WHERE image_id = 1"),
+              HasSubstr("changed during the run"));
+}
+
+TEST_F(ChangedFeatures, ThatAreGoneAreNoticed) {
+  EXPECT_THAT(After("DELETE FROM descriptors WHERE image_id = 1"),
+              HasSubstr("changed during the run"));
+}
+
+TEST_F(ChangedFeatures, OfOtherImagesDoNotMatter) {
+  EXPECT_EQ(After("DELETE FROM descriptors WHERE image_id = 5"), "");
+  EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 1);
+}
+
+TEST_F(DatabaseTest, AnotherFileInItsPlaceIsNoticed) {
+  for (const bool is_replaced : {true, false}) {
+    Write();
+    Execute("PRAGMA journal_mode = DELETE");
+    Database database = Open();
+    database.WritePairs({MakeRows(ImagePair(1, 2), 20)});
+    if (is_replaced) {
+      std::filesystem::copy_file(Path(), directory_.Path() / "copy");
+      std::filesystem::rename(directory_.Path() / "copy", Path());
+    } else {
+      std::filesystem::remove(Path());
+    }
+    EXPECT_THAT(MessageOf([&] { database.CheckInPlace(); }), HasSubstr("replaced by another file"));
+    EXPECT_THAT(MessageOf([&] { database.WritePairs({MakeRows(ImagePair(1, 3), 20)}); }),
+                HasSubstr("replaced by another file"));
+    if (is_replaced) {
+      EXPECT_EQ(Query("SELECT count(*) FROM two_view_geometries"), 1);
+    }
+    std::filesystem::remove(Path());
+  }
+}
+
+// The start of the content of a page, in its header, points behind rows: SQLite reads them all and
+// puts the next row over them.
+TEST_F(DatabaseTest, RowsAreNotWrittenOverOthers) {
+  for (const char* table : {"matches", "two_view_geometries"}) {
+    std::filesystem::remove(Path());
+    Write();
+    Open().WritePairs({MakeRows(ImagePair(1, 2), 5), MakeRows(ImagePair(1, 3), 6)});
+    Execute("PRAGMA journal_mode = DELETE");
+    const std::int64_t page =
+        Query("SELECT rootpage FROM sqlite_schema WHERE name = '" + std::string(table) + "'");
+    {
+      std::fstream file(Path(), std::ios::in | std::ios::out | std::ios::binary);
+      file.seekp((page - 1) * Query("PRAGMA page_size") + 5);
+      file.write("\x0F\xFF", 2);
+    }
+    const auto content = [&] {
+      std::ifstream file(Path(), std::ios::binary);
+      return std::string(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+    };
+    const std::string before = content();
+    Database database = Open();
+    EXPECT_THAT(database.ReadTestedPairs(), SizeIs(2));
+    EXPECT_THAT(
+        MessageOf([&] { database.WritePairs({MakeRows(ImagePair(1, 4), 7)}); }),
+        AllOf(HasSubstr("damaged where " + std::string(table)), HasSubstr("Nothing was written")));
+    EXPECT_EQ(content(), before);
+  }
+}
+
+TEST_F(DatabaseTest, APipeInItsPlaceOrBesideItIsRefused) {
+  Write();
+  Execute("PRAGMA journal_mode = DELETE");
+  const std::filesystem::path wal = Path().string() + "-wal";
+  ASSERT_EQ(::mkfifo(wal.c_str(), 0600), 0);
+  EXPECT_THAT(MessageOf([&] { Open(); }), HasSubstr("-wal: it is a pipe"));
+  std::filesystem::remove(wal);
+  std::filesystem::remove(Path());
+  ASSERT_EQ(::mkfifo(Path().c_str(), 0600), 0);
+  EXPECT_THAT(MessageOf([&] { Open(); }), HasSubstr("it is a pipe"));
 }
 
 TEST_F(DatabaseTest, ReadOnlyFile) {

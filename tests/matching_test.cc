@@ -338,6 +338,24 @@ TEST(DescriptorCache, AnErrorIsThrownToWhoeverWaitsAndTriedAgain) {
   EXPECT_EQ(cache.Wait(cache.Request(3)).All().num, 3U);
 }
 
+TEST(DescriptorCache, WithoutAThreadWhoeverWaitsReads) {
+  DescriptorCache cache(1 << 20, 0, [] { return FeaturesOf; });
+  std::vector<DescriptorCache::Handle> handles;
+  for (ImageId image = 1; image <= 20; ++image) handles.push_back(cache.Request(image));
+  std::atomic<int> wrong{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t) {
+    threads.emplace_back([&] {
+      for (std::size_t i = handles.size(); i-- > 0;) {
+        wrong += cache.Wait(handles[i]).All().num == i + 1 ? 0 : 1;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_EQ(cache.NumReads(), 20U);
+}
+
 TEST(DescriptorCache, AReaderThatCannotStart) {
   DescriptorCache cache(1 << 20, 1,
                         []() -> DescriptorCache::Reader { throw DatabaseError("gone"); });

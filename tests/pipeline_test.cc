@@ -151,7 +151,7 @@ class RunStateTest : public ::testing::Test {
  protected:
   RunState Open(double lock_timeout = 1) {
     const auto warn = [this](const std::string& text) { warnings_.push_back(text); };
-    RunState state(database_, lock_timeout, stop_, warn, warn);
+    RunState state(database_, {lock_timeout, &stop_}, warn, warn);
     ImageVectorOptions options;
     options.gmm.num_components = 2;
     options.pca_dim = pca_dim_;

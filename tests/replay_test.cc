@@ -23,6 +23,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 using ::testing::ThrowsMessage;
 
@@ -383,7 +384,7 @@ TEST_F(ReplayTest, ExportsForOtherPrograms) {
   options_.keep_details = true;
   const PipelineResult result = Run();
   const std::filesystem::path path = directory_.Path() / "out.txt";
-  EXPECT_TRUE(WritePairList(path, result));  // All names have spaces.
+  EXPECT_TRUE(WritePairList(path, result).any_spaces);  // All names have spaces.
   std::istringstream list(ReadFile(path));
   std::string line;
   std::size_t num_lines = 0;
@@ -400,8 +401,20 @@ TEST_F(ReplayTest, ExportsForOtherPrograms) {
 
   PipelineResult plain = result;
   for (ImageRecord& image : plain.images) image.name = std::to_string(image.id) + ".jpg";
-  EXPECT_FALSE(WritePairList(path, plain));
+  const PairListNames plain_names = WritePairList(path, plain);
+  EXPECT_FALSE(plain_names.any_spaces);
+  EXPECT_EQ(plain_names.num_left_out, 0U);
   EXPECT_EQ(ReadFile(path).rfind("29.jpg 30.jpg\n", 0), 0U);
+
+  // No list can hold such names: their pairs are left out, and what is there can be read.
+  const std::string whole = ReadFile(path);
+  plain.images[29].name = "30\n31 32.jpg";
+  const std::size_t num_left_out = WritePairList(path, plain).num_left_out;
+  const std::string rest = ReadFile(path);
+  EXPECT_GT(num_left_out, 0U);
+  EXPECT_EQ(std::count(rest.begin(), rest.end(), '\n') + static_cast<long>(num_left_out),
+            std::count(whole.begin(), whole.end(), '\n'));
+  EXPECT_THAT(rest, Not(HasSubstr("31 32")));
 
   WriteGraph(directory_.Path() / "graph.graphml", result);
   const std::string graphml = ReadFile(directory_.Path() / "graph.graphml");

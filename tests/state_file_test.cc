@@ -25,14 +25,15 @@ constexpr std::size_t kDim = 5;
 class StateFileTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    path_ = directory_.Path() / "a database.db.graphmatch";
+    database_path_ = directory_.Path() / "a database.db";
+    path_ = StateFile::PathFor(database_path_);
     for (ImageId id = 1; id <= 3; ++id) images_.push_back({id, 1000 + id});
     vectors_.resize(images_.size() * kDim);
     std::iota(vectors_.begin(), vectors_.end(), 0.5F);
   }
 
   void WriteAll() {
-    StateFile state(path_, 1);
+    StateFile state(database_path_, 1);
     state.WriteMixture("key", {1, 2, 3});
     state.WriteVectors(images_, kDim, vectors_.data());
     state.WriteSeeds("run", {ImagePair(1, 2), ImagePair(2, 3)});
@@ -49,7 +50,7 @@ class StateFileTest : public ::testing::Test {
     std::size_t num_seeds = 0;
   };
   Found ReadAll() const {
-    StateFile state(path_, 1);
+    StateFile state(database_path_, 1);
     Found found;
     found.mixture = state.ReadMixture("key").has_value();
     std::vector<float> vectors(vectors_.size());
@@ -62,6 +63,7 @@ class StateFileTest : public ::testing::Test {
   }
 
   TestDirectory directory_;
+  std::filesystem::path database_path_;
   std::filesystem::path path_;
   std::vector<ImageFingerprint> images_;
   std::vector<float> vectors_;
@@ -72,7 +74,7 @@ TEST_F(StateFileTest, KeepsWhatItIsGiven) {
   const Found found = ReadAll();
   EXPECT_TRUE(found.mixture);
   EXPECT_THAT(found.vectors, ElementsAre(true, true, true));
-  StateFile state(path_, 1);
+  StateFile state(database_path_, 1);
   EXPECT_EQ(*state.ReadMixture("key"), (sqlite::Blob{1, 2, 3}));
   EXPECT_THAT(*state.ReadSeeds("run"), ElementsAre(ImagePair(1, 2), ImagePair(2, 3)));
   state.WriteSeeds("run", {});
@@ -82,7 +84,7 @@ TEST_F(StateFileTest, KeepsWhatItIsGiven) {
 
 TEST_F(StateFileTest, GivesNothingForOtherKeysOrFeatures) {
   WriteAll();
-  StateFile state(path_, 1);
+  StateFile state(database_path_, 1);
   EXPECT_FALSE(state.ReadMixture("another").has_value());
   EXPECT_FALSE(state.ReadSeeds("another").has_value());
   images_[1].features += 1;
@@ -95,7 +97,7 @@ TEST_F(StateFileTest, GivesNothingForOtherKeysOrFeatures) {
 
 TEST_F(StateFileTest, ANewMixtureDropsTheVectorsOfTheOldOne) {
   WriteAll();
-  { StateFile(path_, 1).WriteMixture("key", {4}); }
+  { StateFile(database_path_, 1).WriteMixture("key", {4}); }
   EXPECT_THAT(ReadAll().vectors, ElementsAre(false, false, false));
 }
 
@@ -112,7 +114,7 @@ TEST_F(StateFileTest, DamagedRowsAreAsIfTheyWereNotThere) {
 
 TEST_F(StateFileTest, DropsVectorsOfImagesThatAreGone) {
   WriteAll();
-  StateFile state(path_, 1);
+  StateFile state(database_path_, 1);
   state.DropVectorsExcept({images_[0], images_[2], {99, 1}});
   std::vector<float> vectors(vectors_.size());
   EXPECT_THAT(state.ReadVectors(images_, kDim, vectors.data()), ElementsAre(true, false, true));
@@ -134,9 +136,9 @@ TEST_F(StateFileTest, MadeAnewItStaysTheSameFileForThoseThatWait) {
     } else {
       Execute("PRAGMA user_version = 999");
     }
-    const StateFile state(path_, 1);
+    const StateFile state(database_path_, 1);
     EXPECT_EQ(inode(), before);
-    EXPECT_THROW(StateFile(path_, 0), DatabaseLockedError);
+    EXPECT_THROW(StateFile(database_path_, 0), DatabaseLockedError);
   }
 }
 
@@ -164,7 +166,7 @@ TEST_F(StateFileTest, WithDamagedPagesItIsMadeAnewOrReadAsFarAsItIsWhole) {
     try {
       ReadAll();
     } catch (const sqlite::DamagedFileError&) {
-      StateFile(path_, 1).MakeAnew();
+      StateFile(database_path_, 1).MakeAnew();
     }
     WriteAll();
     EXPECT_THAT(ReadAll().vectors, ElementsAre(true, true, true));
@@ -174,11 +176,11 @@ TEST_F(StateFileTest, WithDamagedPagesItIsMadeAnewOrReadAsFarAsItIsWhole) {
 TEST_F(StateFileTest, WhatIsNotItsOwnIsLeftAlone) {
   std::ofstream(path_) << "a letter to my grandmother, longer than the header of a database: "
                        << std::string(200, 'x');
-  EXPECT_THROW(StateFile(path_, 1), DatabaseError);
+  EXPECT_THROW(StateFile(database_path_, 1), DatabaseError);
   std::filesystem::remove(path_);
   WriteSyntheticDatabase(path_, Schema::kColmap38, MakePlaces(1, 2, 5, 1));
   try {
-    const StateFile state(path_, 1);
+    const StateFile state(database_path_, 1);
     FAIL() << "another database was taken";
   } catch (const DatabaseError& error) {
     EXPECT_THAT(error.what(), HasSubstr("is in the way"));
@@ -187,13 +189,35 @@ TEST_F(StateFileTest, WhatIsNotItsOwnIsLeftAlone) {
 }
 
 TEST_F(StateFileTest, OnlyOneRunHasIt) {
-  const StateFile state(path_, 1);
+  const StateFile state(database_path_, 1);
   try {
-    const StateFile second(path_, 0.05);
+    const StateFile second(database_path_, 0.05);
     FAIL() << "two runs at once";
   } catch (const DatabaseLockedError& error) {
     EXPECT_THAT(error.what(), HasSubstr("Another graphmatch_matcher works on this database"));
   }
+}
+
+TEST_F(StateFileTest, WhoMayNotReadTheDatabaseMayNotReadItEither) {
+  using std::filesystem::perms;
+  const auto rights = [&] { return std::filesystem::status(path_).permissions(); };
+  std::ofstream(database_path_) << "a database";
+  std::filesystem::permissions(database_path_, perms::owner_read | perms::owner_write);
+  { const StateFile made(database_path_, 1); }
+  EXPECT_EQ(rights(), perms::owner_read | perms::owner_write);
+  std::filesystem::permissions(path_, perms(0644));
+  { const StateFile found(database_path_, 1); }
+  EXPECT_EQ(rights(), perms::owner_read | perms::owner_write);
+  std::filesystem::permissions(database_path_, perms(0664));
+  std::filesystem::remove(path_);
+  { const StateFile shared(database_path_, 1); }
+  EXPECT_EQ(rights() & perms::group_read, perms::group_read);
+}
+
+TEST_F(StateFileTest, APipeInItsPlaceIsLeftAlone) {
+  ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
+  EXPECT_THROW(StateFile(database_path_, 1), DatabaseError);
+  EXPECT_TRUE(std::filesystem::is_fifo(path_));
 }
 
 TEST_F(StateFileTest, BelongsToTheDatabaseWhateverItsName) {

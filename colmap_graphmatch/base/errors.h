@@ -45,6 +45,12 @@ class StoppedError : public Error {
   StoppedError() : Error("The run was stopped.") {}
 };
 
+// The system lets this program start no more threads or processes, or open no more files.
+class SystemLimitError : public Error {
+ public:
+  using Error::Error;
+};
+
 // The working directory, or any other file that is not a database, cannot be written or read.
 class FileError : public Error {
  public:

@@ -2,21 +2,56 @@
 
 #include <algorithm>
 #include <atomic>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/thread_pool.hpp>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include "colmap_graphmatch/base/errors.h"
 
 namespace colmap_graphmatch {
 
+ThreadGroup::ThreadGroup(std::size_t num_threads, const std::function<void()>& work) {
+  threads_.reserve(num_threads);
+  try {
+    while (threads_.size() < num_threads) threads_.emplace_back(work);
+  } catch (const std::system_error&) {
+    // Those that there are do it.
+  }
+}
+
+void ThreadGroup::Join() {
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
+}
+
+// Not Boost's thread_pool: its constructor waits for ever if it cannot start all of its threads.
 struct ThreadPool::Workers {
-  explicit Workers(std::size_t num_threads) : pool(num_threads) {}
-  boost::asio::thread_pool pool;
+  explicit Workers(std::size_t num_threads) {
+    Start(num_threads);
+    if (threads->Size() == num_threads) return;
+    // Others are to come, and processes, under the same limit.
+    const std::size_t num_started = threads->Size();
+    context.stop();
+    threads->Join();
+    context.restart();
+    Start(num_started / 2);
+  }
+  ~Workers() { context.stop(); }
+
+  void Start(std::size_t num_threads) {
+    threads = std::make_unique<ThreadGroup>(num_threads, [this] { context.run(); });
+  }
+
+  boost::asio::io_context context;
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> open{
+      context.get_executor()};
+  std::unique_ptr<ThreadGroup> threads;
 };
 
 int EffectiveNumThreads(int num_threads) {
@@ -33,6 +68,7 @@ int EffectiveNumThreads(int num_threads) {
 ThreadPool::ThreadPool(int num_threads) : num_threads_(EffectiveNumThreads(num_threads)) {
   if (num_threads_ > 1) {
     workers_ = std::make_unique<Workers>(static_cast<std::size_t>(num_threads_ - 1));
+    num_threads_ = static_cast<int>(workers_->threads->Size()) + 1;
   }
 }
 
@@ -57,10 +93,10 @@ void ThreadPool::ParallelFor(std::size_t count, const std::function<void(std::si
     }
   };
 
-  if (workers_ && count > 1) {
+  if (num_threads_ > 1 && count > 1) {
     num_running = std::min(count, static_cast<std::size_t>(num_threads_)) - 1;
     for (std::size_t i = num_running; i > 0; --i) {
-      boost::asio::post(workers_->pool, [&] {
+      boost::asio::post(workers_->context, [&] {
         work();
         // Notified under the lock: the waiting thread destroys the condition once it can leave.
         const std::lock_guard<std::mutex> lock(mutex);

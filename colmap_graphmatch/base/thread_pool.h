@@ -3,14 +3,36 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <thread>
+#include <vector>
 
 namespace colmap_graphmatch {
+
+// Threads that do the same work, each once.
+class ThreadGroup {
+ public:
+  // Starts up to num_threads threads that call work(), which may not throw: fewer, perhaps none,
+  // if the system lets this process have no more (ulimit -u, limits of containers and clusters).
+  ThreadGroup(std::size_t num_threads, const std::function<void()>& work);
+  ~ThreadGroup() { Join(); }
+  ThreadGroup(const ThreadGroup&) = delete;
+  ThreadGroup& operator=(const ThreadGroup&) = delete;
+
+  std::size_t Size() const { return threads_.size(); }
+
+  // Returns when all have ended; then there are none.
+  void Join();
+
+ private:
+  std::vector<std::thread> threads_;
+};
 
 // A fixed number of threads for loops whose iterations are independent of each other. Results never
 // depend on the number of threads as long as iteration i writes only what belongs to i.
 class ThreadPool {
  public:
-  // num_threads: at least 1, or -1 for all cores. Throws OptionsError for any other value.
+  // num_threads: at least 1, or -1 for all cores. Throws OptionsError for any other value. Has
+  // fewer where the system lets this process have no more.
   explicit ThreadPool(int num_threads);
   ~ThreadPool();
 

@@ -5,15 +5,13 @@
 #include <spdlog/logger.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/base_sink.h>
-#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/ostream_sink.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <utility>
 #include <vector>
 
@@ -238,18 +236,11 @@ spdlog::level::level_enum LevelOf(const LogOptions& options) {
   return severity == 1 ? spdlog::level::warn : spdlog::level::err;
 }
 
-std::unique_ptr<spdlog::logger> MakeFileLog(std::filesystem::path path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) path /= "graphmatch_matcher.log";
-  if (!std::ofstream(path, std::ios::app)) {
-    throw FileError("Cannot write the log " + path.string() + ": " + std::strerror(errno) + ".");
-  }
-  auto sink = std::make_shared<spdlog::sinks::basic_file_sink_st>(path.string());
+std::unique_ptr<spdlog::logger> MakeFileLog(std::ostream& file) {
+  auto sink = std::make_shared<spdlog::sinks::ostream_sink_st>(file);
   auto log = std::make_unique<spdlog::logger>("file", std::move(sink));
   log->set_pattern(kPattern);
   log->flush_on(spdlog::level::info);
-  // A full disk under the log changes nothing else, and spdlog's own words would go into the block.
-  log->set_error_handler([](const std::string&) {});
   return log;
 }
 
@@ -267,12 +258,14 @@ Console::Console(const LogOptions& options)
   sink_ = std::make_shared<TerminalSink>(stream_, has_color_);
   terminal_log_ = std::make_unique<spdlog::logger>("terminal", sink_);
   terminal_log_->set_level(only_file ? spdlog::level::err : LevelOf(options));
-  const bool has_file = only_file || options.target == LogOptions::Target::kStderrAndFile;
-  if (has_file && !options.path.empty()) {
-    file_log_ = MakeFileLog(options.path);
+  const std::filesystem::path path = options.FilePath();
+  if (!path.empty()) {
+    file_ = std::make_unique<GrowingFile>(path, GrowingFile::Mode::kAppend);
+    file_log_ = MakeFileLog(*file_);
     file_log_->set_level(LevelOf(options));
   }
-  watcher_ = std::thread([this] { Watch(); });
+  watcher_ = std::make_unique<ThreadGroup>(1, [this] { Watch(); });
+  if (watcher_->Size() == 0) has_block_ = false;
 }
 
 Console::~Console() {
@@ -282,7 +275,7 @@ Console::~Console() {
     ends_ = true;
   }
   ended_.notify_one();
-  watcher_.join();
+  watcher_->Join();
 }
 
 void Console::OnInfo(const std::string& message) {
@@ -331,7 +324,12 @@ void Console::Log(int level, const std::string& message, bool on_terminal) {
   const spdlog::log_clock::time_point now = spdlog::log_clock::now();
   const auto severity = static_cast<spdlog::level::level_enum>(level);
   if (on_terminal) terminal_log_->log(now, spdlog::source_loc(), severity, text);
-  if (file_log_) file_log_->log(now, spdlog::source_loc(), severity, text);
+  if (!file_log_) return;
+  file_log_->log(now, spdlog::source_loc(), severity, text);
+  if (file_->Error() == 0 || std::exchange(said_log_fails_, true)) return;
+  terminal_log_->log(now, spdlog::source_loc(), spdlog::level::warn,
+                     fmt::format("The log {} cannot be written any more: {}. The run goes on.",
+                                 options_.FilePath().string(), std::strerror(file_->Error())));
 }
 
 void Console::LogStage() {

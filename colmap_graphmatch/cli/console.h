@@ -7,8 +7,9 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 
+#include "colmap_graphmatch/base/output_file.h"
+#include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/cli/log_options.h"
 #include "colmap_graphmatch/cli/progress.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
@@ -64,6 +65,7 @@ class Console : public PipelineObserver {
   bool has_block_ = false;  // The stream is a terminal that can show one.
   std::shared_ptr<TerminalSink> sink_;
   std::unique_ptr<spdlog::logger> terminal_log_;
+  std::unique_ptr<GrowingFile> file_;
   std::unique_ptr<spdlog::logger> file_log_;
 
   std::mutex mutex_;  // Of everything below.
@@ -79,11 +81,13 @@ class Console : public PipelineObserver {
   double last_drawn_ = 0;
   bool is_drawn_current_ = false;
   bool said_interrupted_ = false;
+  bool said_log_fails_ = false;
 
   std::atomic<bool> interrupted_{false};
   std::atomic<bool> continued_{false};
   static_assert(std::atomic<bool>::is_always_lock_free);
-  std::thread watcher_;
+  // None if the system gives none: then there is no block.
+  std::unique_ptr<ThreadGroup> watcher_;
 };
 
 // With '?' in their place, but for line ends and tabs. Names from a database could otherwise give

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <system_error>
 
 namespace colmap_graphmatch {
 
@@ -14,6 +15,14 @@ struct LogOptions {
   int verbosity = 0;           // From 3 on every stage of every iteration has a line.
   bool color = true;           // On a terminal, unless NO_COLOR is set.
   bool quiet = false;          // No progress, and no severity below warnings.
+
+  // The file that is appended to; empty: none.
+  std::filesystem::path FilePath() const {
+    const bool has_file = target == Target::kFile || target == Target::kStderrAndFile;
+    if (!has_file || path.empty()) return {};
+    std::error_code ignored;
+    return std::filesystem::is_directory(path, ignored) ? path / "graphmatch_matcher.log" : path;
+  }
 };
 
 }  // namespace colmap_graphmatch

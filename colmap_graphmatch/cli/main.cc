@@ -1,3 +1,7 @@
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -10,13 +14,14 @@
 #include <string>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/output_file.h"
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/base/version.h"
-#include "colmap_graphmatch/base/whole_file.h"
 #include "colmap_graphmatch/cli/console.h"
 #include "colmap_graphmatch/cli/exit_codes.h"
 #include "colmap_graphmatch/cli/options.h"
+#include "colmap_graphmatch/cli/run_files.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/report/exports.h"
 #include "colmap_graphmatch/report/html_report.h"
@@ -36,31 +41,56 @@ void HandleSignal(int signal) {
     if (console != nullptr) console->NoteContinue();
     return;
   }
+  if (stop_request.Abandon()) {
+    // Asked for the third time: whatever it is that does not end, the database can do without it.
+    std::signal(signal, SIG_DFL);
+    ::raise(signal);
+    return;
+  }
   stop_request.Raise();
   if (console != nullptr) console->NoteInterrupt();
 }
 
-// For as long as it lives, signals ask the run to stop and tell the console so.
-class SignalHandlers {
- public:
-  explicit SignalHandlers(Console* console) {
-    signalled_console = console;
-    struct sigaction action = {};
-    action.sa_handler = HandleSignal;
-    action.sa_flags = SA_RESTART;
-    ::sigaction(SIGINT, &action, nullptr);
-    ::sigaction(SIGTERM, &action, nullptr);
-    ::sigaction(SIGCONT, &action, nullptr);
-    // The terminal is gone; with nohup the signal is ignored already and stays so.
-    struct sigaction hangup = {};
-    ::sigaction(SIGHUP, nullptr, &hangup);
-    if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
-    // Output that nobody reads any more must not end a run of hours.
-    std::signal(SIGPIPE, SIG_IGN);
+void HandleSignals() {
+  struct sigaction action = {};
+  action.sa_handler = HandleSignal;
+  action.sa_flags = SA_RESTART;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  ::sigaction(SIGCONT, &action, nullptr);
+  // The terminal is gone; with nohup the signal is ignored already and stays so.
+  struct sigaction hangup = {};
+  ::sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
+  // Output that nobody reads any more must not end a run of hours, and a file that may grow no
+  // larger is an error like others.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+// A standard stream that is closed: its number would go to the next file that is opened, and what
+// is printed into that file. This one can be neither read nor written to, as if it were closed.
+void FillStandardStreams() {
+  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(number, F_GETFD) >= 0 || errno != EBADF) continue;
+    const int mode = number == STDIN_FILENO ? O_WRONLY : O_RDONLY;
+    if (::open("/dev/null", mode) < 0) ::open("/", O_RDONLY);
   }
-  ~SignalHandlers() { signalled_console = nullptr; }
-  SignalHandlers(const SignalHandlers&) = delete;
-  SignalHandlers& operator=(const SignalHandlers&) = delete;
+}
+
+// A umask that takes rights from the owner would take this program's own files from it.
+void KeepOwnFilesUsable() {
+  const mode_t others = S_IRWXG | S_IRWXO;
+  ::umask(::umask(others) & others);
+}
+
+// For as long as it lives, the console is told of signals.
+class SignalledConsole {
+ public:
+  explicit SignalledConsole(Console* console) { signalled_console = console; }
+  ~SignalledConsole() { signalled_console = nullptr; }
+  SignalledConsole(const SignalledConsole&) = delete;
+  SignalledConsole& operator=(const SignalledConsole&) = delete;
 };
 
 // Results are in the database, and a full disk under the standard output changes nothing about
@@ -99,23 +129,30 @@ void WriteReport(const CommandLine& line, const PipelineResult& result, Console&
 // The files that were asked for.
 void WriteFiles(const CommandLine& line, const PipelineResult& result, Console& console) {
   if (!line.report_path.empty()) WriteReport(line, result, console);
-  if (!line.pair_list_path.empty() && WritePairList(line.pair_list_path, result)) {
-    console.OnWarning("Some names of images have spaces: lines of " + line.pair_list_path.string() +
-                      " with such a name have a tab between the names, and COLMAP and hloc cannot "
-                      "read them; --GraphMatching.match_list_path can.");
+  if (!line.pair_list_path.empty()) {
+    const PairListNames names = WritePairList(line.pair_list_path, result);
+    if (names.any_spaces) {
+      console.OnWarning(
+          "Some names of images have spaces: lines of " + line.pair_list_path.string() +
+          " with such a name have a tab between the names, and COLMAP and hloc cannot "
+          "read them; --GraphMatching.match_list_path can.");
+    }
+    if (names.num_left_out > 0) {
+      console.OnWarning(std::to_string(names.num_left_out) + " pairs are not in " +
+                        line.pair_list_path.string() +
+                        ": the names of their images have line ends or tabs, which no list can "
+                        "hold.");
+    }
   }
   if (!line.graph_path.empty()) WriteGraph(line.graph_path, result);
 }
 
 int Run(const CommandLine& line, Console& console) {
-  const SignalHandlers handlers(&console);
+  const SignalledConsole signalled(&console);
   for (const std::string& message : line.unused_options) console.OnInfo(message);
   for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
-    for (const auto& path : {line.report_path, JsonReportPath(line.report_path),
-                             line.pair_list_path, line.graph_path}) {
-      if (!path.empty()) CheckCanWrite(path);
-    }
+    CheckOutputs(FilesOfRun(line));
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
     console.EndProgress();
     if (!line.log.quiet) {
@@ -123,6 +160,13 @@ int Run(const CommandLine& line, Console& console) {
       WarnIfNotWritten(std::cout, console);
     }
     WriteFiles(line, result, console);
+    const VerifierStatistics& verification = result.verification;
+    if (verification.num_failed > 0 && verification.num_verified == 0 &&
+        result.stopped_by != PipelineResult::StoppedBy::kRequest) {
+      console.Error("COLMAP failed on all " + std::to_string(verification.num_failed) +
+                    " pairs that it was given; the warnings above say how. They stay untested.");
+      return kExitColmap;
+    }
     if (result.matching.finished) return kExitSuccess;
     if (result.stopped_by != PipelineResult::StoppedBy::kRequest) {
       console.OnInfo(
@@ -141,6 +185,9 @@ int Run(const CommandLine& line, Console& console) {
 }
 
 int Main(int argc, const char* const* argv) {
+  HandleSignals();
+  FillStandardStreams();
+  KeepOwnFilesUsable();
   // Until it is known what the user wants.
   auto console = std::make_unique<Console>(LogOptions());
   const auto fail = [&](const char* message, ExitCode code) {
@@ -148,7 +195,7 @@ int Main(int argc, const char* const* argv) {
     return code;
   };
   try {
-    const CommandLine line = ParseCommandLine(argc, argv);
+    const CommandLine line = ParseCommandLine(argc, argv, &stop_request);
     if (line.help) {
       PrintHelp(std::cout);
       WarnIfNotWritten(std::cout.flush(), *console);
@@ -171,6 +218,11 @@ int Main(int argc, const char* const* argv) {
     return fail(error.what(), kExitColmap);
   } catch (const FileError& error) {
     return fail(error.what(), kExitFile);
+  } catch (const SystemLimitError& error) {
+    return fail(error.what(), kExitFile);
+  } catch (const StoppedError&) {
+    console->OnInfo("Stopped as asked.");
+    return kExitInterrupted;
   } catch (const std::bad_alloc&) {
     return fail("out of memory. What was verified before is in the database.", kExitInternal);
   } catch (const std::exception& error) {

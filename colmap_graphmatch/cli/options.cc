@@ -4,23 +4,21 @@
 #include <boost/lexical_cast.hpp>
 #include <boost/program_options.hpp>
 #include <cctype>
-#include <cerrno>
 #include <cstdint>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
 #include <random>
 #include <set>
+#include <sstream>
 #include <tuple>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/input_file.h"
 #include "colmap_graphmatch/cli/option_table.h"
-#include "colmap_graphmatch/database/state_file.h"
-#include "colmap_graphmatch/report/json_report.h"
+#include "colmap_graphmatch/cli/run_files.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -86,7 +84,8 @@ std::string MessageOf(po::error* error) {
 
 class Parser {
  public:
-  explicit Parser(CommandLine* line) : line_(line), rows_(MakeOptionTable(line)) {
+  Parser(CommandLine* line, const StopRequest* stop)
+      : line_(line), stop_(stop), rows_(MakeOptionTable(line)) {
     for (const OptionRow& row : rows_) {
       for (const std::string& name : row.names) {
         if (name.size() == 1) continue;  // Comes with its long name.
@@ -128,57 +127,17 @@ class Parser {
           std::to_string(p.seed % (std::uint64_t{1} << 31U));
     }
     p.verification.num_threads = p.num_threads;
-    CheckOutputs();
     LogOptions& log = line_->log;
     if (!line_->log_to_stderr && !log.path.empty()) log.target = LogOptions::Target::kFile;
     if (log.target == LogOptions::Target::kFile && log.path.empty()) {
       throw OptionsError("--log_target file needs --log_path, the file that is meant.");
     }
+    CheckFiles();
     p.Check();
   }
 
  private:
-  // A file that is written may be neither one that is read nor another one that is written: a
-  // database in the place of which there is a list of pairs is lost.
-  void CheckThatFilesDiffer() const {
-    const PipelineOptions& p = line_->pipeline;
-    const ImageRankingOptions& ranking = p.ranking;
-    using File = std::pair<const char*, std::filesystem::path>;
-    const std::vector<File> read = {
-        {"--database_path", p.database_path},
-        {"--database_path with .graphmatch", StateFile::PathFor(p.database_path)},
-        {"--project_path", line_->project_path},
-        {"--GraphMatching.match_list_path", p.match_list_path},
-        {"--VocabTreeMatching.match_list_path", p.image_list_path},
-        {"--GraphMatching.replay_path", p.replay_path},
-        {"--GraphMatching.ranking_path", ranking.ranking_path},
-        {"--GraphMatching.vectors_path", ranking.vectors.vectors_path}};
-    std::vector<File> written = {{"--GraphMatching.report", line_->report_path},
-                                 {"--GraphMatching.export_pairs", line_->pair_list_path},
-                                 {"--GraphMatching.export_graph", line_->graph_path},
-                                 {"--GraphMatching.test_log", p.test_log_path},
-                                 {"--GraphMatching.export_vectors", ranking.export_path},
-                                 {"--log_path", line_->log.path}};
-    if (IsPage(line_->report_path)) {
-      written.emplace_back("--GraphMatching.report with .json", JsonReportPath(line_->report_path));
-    }
-    const auto check = [](const File& file, const File& other) {
-      if (file.second.empty() || other.second.empty()) return;
-      std::error_code ignored;
-      const bool is_same = std::filesystem::equivalent(file.second, other.second, ignored) ||
-                           std::filesystem::weakly_canonical(file.second, ignored) ==
-                               std::filesystem::weakly_canonical(other.second, ignored);
-      if (!is_same) return;
-      throw OptionsError(std::string(file.first) + " and " + other.first + " are the same file, " +
-                         file.second.string() + ": one would take the place of the other.");
-    };
-    for (std::size_t i = 0; i < written.size(); ++i) {
-      for (const File& other : read) check(written[i], other);
-      for (std::size_t j = 0; j < i; ++j) check(written[i], written[j]);
-    }
-  }
-
-  void CheckOutputs() {
+  void CheckFiles() {
     PipelineOptions& p = line_->pipeline;
     const auto& graph = line_->graph_path;
     if (p.dry_run && (!line_->report_path.empty() || !graph.empty() || !p.test_log_path.empty())) {
@@ -198,7 +157,7 @@ class Parser {
       throw OptionsError("--GraphMatching.export_graph is " + graph.string() +
                          "; it must end in .graphml, or in .dot or .gv for Graphviz.");
     }
-    CheckThatFilesDiffer();
+    CheckThatFilesDiffer(FilesOfRun(*line_));
     p.keep_details =
         !line_->report_path.empty() || !line_->pair_list_path.empty() || !graph.empty();
   }
@@ -239,11 +198,12 @@ class Parser {
   // options of other commands are left out.
   void ReadProject() {
     const std::string path = line_->project_path.string();
-    std::ifstream file(path);
-    const int reason = errno;
-    if (!file || std::filesystem::is_directory(path)) {
+    std::istringstream file;
+    try {
+      file.str(ReadText(path, stop_));
+    } catch (const UnreadableFileError& error) {
       throw OptionsError("Cannot read the project file " + path +
-                         " (--project_path): " + std::strerror(file ? EISDIR : reason) + ".");
+                         " (--project_path): " + error.Reason() + ".");
     }
     po::parsed_options parsed(&accepted_);
     try {
@@ -328,6 +288,7 @@ class Parser {
   }
 
   CommandLine* line_;
+  const StopRequest* stop_;
   std::vector<OptionRow> rows_;
   std::map<std::string, const OptionRow*> by_name_;
   po::options_description accepted_;
@@ -336,9 +297,9 @@ class Parser {
 
 }  // namespace
 
-CommandLine ParseCommandLine(int argc, const char* const* argv) {
+CommandLine ParseCommandLine(int argc, const char* const* argv, const StopRequest* stop) {
   CommandLine line;
-  Parser(&line).Parse(argc, argv);
+  Parser(&line, stop).Parse(argc, argv);
   return line;
 }
 

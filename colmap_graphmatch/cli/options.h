@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/cli/log_options.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 
@@ -28,8 +29,9 @@ struct CommandLine {
   std::vector<std::string> warnings;
 };
 
-// Throws OptionsError.
-CommandLine ParseCommandLine(int argc, const char* const* argv);
+// stop: ends the wait for a project file that comes from a pipe (base/input_file.h). Throws
+// OptionsError and StoppedError.
+CommandLine ParseCommandLine(int argc, const char* const* argv, const StopRequest* stop = nullptr);
 
 void PrintHelp(std::ostream& stream);
 

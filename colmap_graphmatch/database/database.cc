@@ -158,8 +158,8 @@ bool IsEdge(std::size_t num_inliers, int config, std::size_t min_num_inliers) {
 }
 
 Database::Database(const std::filesystem::path& path, sqlite::Access access,
-                   double lock_timeout_seconds)
-    : connection_(ExistingFile(path), access, lock_timeout_seconds) {
+                   const sqlite::LockPatience& patience)
+    : connection_(ExistingFile(path), access, patience) {
   CheckSchema();
 }
 
@@ -471,9 +471,72 @@ std::vector<ImagePair> Database::ReadUnverifiedPairs() {
   return pairs;
 }
 
+void Database::ExpectFeatures(const std::vector<ImageRecord>& images,
+                              const std::vector<ImageFingerprint>& fingerprints) {
+  expected_.clear();
+  for (const ImageFingerprint& fingerprint : fingerprints) {
+    expected_[fingerprint.id].features = fingerprint.features;
+  }
+  for (const ImageRecord& image : images) {
+    const auto expected = expected_.find(image.id);
+    if (expected != expected_.end()) expected->second.image = image;
+  }
+}
+
+bool Database::HasFeatures(const ImageRecord& image, std::int64_t features) {
+  // Their number is part of the fingerprint: as it is now.
+  sqlite::Statement select(connection_, "SELECT rows FROM descriptors WHERE image_id = ?1");
+  if (!select.Bind(1, std::int64_t{image.id}).Step()) return false;
+  ImageRecord now = image;
+  now.num_features = static_cast<std::size_t>(std::max<std::int64_t>(0, select.Int(0)));
+  try {
+    const std::vector<ImageFingerprint> found = ReadFingerprints({now});
+    return !found.empty() && found.front().features == features;
+  } catch (const DatabaseLockedError&) {
+    throw;
+  } catch (const DatabaseError&) {
+    return false;  // There is no blob any more.
+  }
+}
+
+void Database::CheckFeatures(const std::vector<PairRows>& pairs) {
+  if (expected_.empty()) return;
+  const std::int64_t version = connection_.DataVersion();
+  std::vector<ImageRecord> unseen;
+  for (const PairRows& rows : pairs) {
+    for (const ImageId id : {rows.pair.id1, rows.pair.id2}) {
+      ExpectedFeatures& expected = expected_.at(id);
+      if (expected.seen_in == version) continue;
+      expected.seen_in = version;
+      unseen.push_back(expected.image);
+    }
+  }
+  for (const ImageRecord& image : unseen) {
+    if (HasFeatures(image, expected_.at(image.id).features)) continue;
+    throw DatabaseError("The features of image \"" + image.name + "\" (id " +
+                        std::to_string(image.id) + ") in " + Path().string() +
+                        " changed during the run. Pairs of its old features are not written. Let "
+                        "the other program finish, then run the same command again.");
+  }
+}
+
 void Database::CheckWritable() { const sqlite::Transaction rolled_back(connection_); }
 
-void Database::WritePairs(const std::vector<PairRows>& pairs) {
+void Database::CheckInPlace() {
+  if (!connection_.HasMoved()) return;
+  throw DatabaseError(Path().string() +
+                      " was moved, deleted or replaced by another file during the run. What was "
+                      "verified since then went with the old file. Run the same command again.");
+}
+
+std::vector<TestedPair> Database::WritePairs(const std::vector<PairRows>& pairs) {
+  CheckInPlace();
+  if (!pages_are_checked_) {
+    for (const char* table : {"matches", "two_view_geometries"}) connection_.CheckPages(table);
+    pages_are_checked_ = true;
+  }
+  // What was computed is only given up when somebody is in a hurry.
+  connection_.GiveUpAt(StopRequest::kAbandonShards);
   std::vector<std::string> columns = {"pair_id", "rows", "cols", "data", "config"};
   std::string parameters = "?1, ?2, ?3, ?4, ?5";
   for (const std::size_t i : geometry_columns_) {
@@ -481,7 +544,10 @@ void Database::WritePairs(const std::vector<PairRows>& pairs) {
     parameters += ", ?" + std::to_string(columns.size());
   }
   sqlite::Transaction transaction(connection_);
-  sqlite::Statement exists(connection_, "SELECT 1 FROM two_view_geometries WHERE pair_id = ?1");
+  CheckFeatures(pairs);
+  sqlite::Statement select_other(connection_,
+                                 "SELECT rows, config FROM two_view_geometries WHERE pair_id = ?1");
+  std::vector<TestedPair> of_others;
   sqlite::Statement insert_matches(
       connection_,
       "INSERT OR REPLACE INTO matches(pair_id, rows, cols, data) VALUES(?1, ?2, ?3, ?4)");
@@ -490,8 +556,13 @@ void Database::WritePairs(const std::vector<PairRows>& pairs) {
       "INSERT INTO two_view_geometries(" + Join(columns) + ") VALUES(" + parameters + ")");
   for (const PairRows& pair : pairs) {
     const auto pair_id = static_cast<std::int64_t>(EncodePair(pair.pair));
-    const bool tested_by_others = exists.Bind(1, pair_id).Step();
-    exists.Reset();
+    const bool tested_by_others = select_other.Bind(1, pair_id).Step();
+    if (tested_by_others) {
+      of_others.push_back({pair.pair,
+                           static_cast<std::size_t>(std::max<std::int64_t>(0, select_other.Int(0))),
+                           static_cast<int>(select_other.Int(1))});
+    }
+    select_other.Reset();
     if (tested_by_others) continue;
 
     insert_matches.Bind(1, pair_id)
@@ -532,6 +603,8 @@ void Database::WritePairs(const std::vector<PairRows>& pairs) {
     insert_geometry.Run();
   }
   transaction.Commit();
+  CheckInPlace();
+  return of_others;
 }
 
 }  // namespace colmap_graphmatch

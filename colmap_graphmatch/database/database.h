@@ -62,8 +62,9 @@ bool IsEdge(std::size_t num_inliers, int config, std::size_t min_num_inliers);
 // one is at fault, the image.
 class Database {
  public:
-  // lock_timeout_seconds: how long to wait for the locks of other processes before giving up.
-  Database(const std::filesystem::path& path, sqlite::Access access, double lock_timeout_seconds);
+  // patience: with the locks of other processes.
+  Database(const std::filesystem::path& path, sqlite::Access access,
+           const sqlite::LockPatience& patience);
 
   const std::filesystem::path& Path() const { return connection_.Path(); }
 
@@ -81,6 +82,12 @@ class Database {
   // What tells whether the features of an image are still the same: their number and the beginnings
   // of their descriptors and keypoints. Images without features are left out.
   std::vector<ImageFingerprint> ReadFingerprints(const std::vector<ImageRecord>& images);
+
+  // From now on WritePairs throws if an image of a pair, which must be among these, has other
+  // features: what is to be written was computed from those that it had. images and fingerprints:
+  // as read before.
+  void ExpectFeatures(const std::vector<ImageRecord>& images,
+                      const std::vector<ImageFingerprint>& fingerprints);
 
   // The frame of every image that has one (COLMAP 3.12 and later): what the cameras of a rig took
   // at the same time.
@@ -103,14 +110,23 @@ class Database {
   // late.
   void CheckWritable();
 
-  // Adds pairs in one transaction: after an error nothing of them is in the database. A pair that
-  // another program has tested in the meantime is left as that program wrote it. Matrices are
+  // Throws if there is another file at the path by now, or none: what was written since is in a
+  // file that is gone.
+  void CheckInPlace();
+
+  // Adds pairs in one transaction: after an error nothing of them is in the database. The first
+  // call goes through all pages of both tables, and throws if they are damaged. A pair that
+  // another program has tested in the meantime is left as that program wrote it; returns those, as
+  // they are in the database. Matrices are
   // stored the way the COLMAP that made this database marks unset ones: zeros up to 3.8, NULL
   // since.
-  void WritePairs(const std::vector<PairRows>& pairs);
+  std::vector<TestedPair> WritePairs(const std::vector<PairRows>& pairs);
 
  private:
   void CheckSchema();
+  // Whether the features of an image have this fingerprint.
+  bool HasFeatures(const ImageRecord& image, std::int64_t features);
+  void CheckFeatures(const std::vector<PairRows>& pairs);
   [[noreturn]] void ThrowNotColmaps(const std::string& problem) const;
   // What `problem` says of the file is only possible if it is damaged.
   [[noreturn]] void ThrowDamaged(const std::string& problem) const;
@@ -119,6 +135,15 @@ class Database {
   bool unset_is_null_ = true;
   std::vector<std::size_t> geometry_columns_;  // The indices in kGeometryColumns that exist here.
   bool descriptors_have_type_ = false;
+  bool pages_are_checked_ = false;
+
+  // What ExpectFeatures was told of an image.
+  struct ExpectedFeatures {
+    ImageRecord image;
+    std::int64_t features = 0;
+    std::int64_t seen_in = 0;  // The version of the data in which they were found unchanged.
+  };
+  std::unordered_map<ImageId, ExpectedFeatures> expected_;
 };
 
 }  // namespace colmap_graphmatch

@@ -85,9 +85,9 @@ void CheckCopiedMatches(sqlite::Connection& shard, const std::filesystem::path& 
 std::string ShardImageName(ImageId image_id) { return std::to_string(image_id); }
 
 void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
-               double lock_timeout_seconds, const std::vector<ShardPair>& pairs,
+               const sqlite::LockPatience& patience, const std::vector<ShardPair>& pairs,
                bool with_descriptors) {
-  sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, lock_timeout_seconds);
+  sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, patience);
   shard.AttachReadOnly(database_path, "source");
   // A shard is thrown away when anything goes wrong: it need not survive a crash.
   shard.Execute("PRAGMA main.synchronous = OFF");

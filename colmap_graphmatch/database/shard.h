@@ -31,7 +31,7 @@ struct ShardPair {
 // matches, and if the user's database has matches for it that cannot be: a blob of the wrong size,
 // features that the images do not have.
 void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
-               double lock_timeout_seconds, const std::vector<ShardPair>& pairs,
+               const sqlite::LockPatience& patience, const std::vector<ShardPair>& pairs,
                bool with_descriptors);
 
 // What COLMAP wrote into the shard for the pairs. Throws DatabaseError if a pair has no result, or

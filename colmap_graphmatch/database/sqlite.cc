@@ -1,14 +1,21 @@
 #include "colmap_graphmatch/database/sqlite.h"
 
 #include <sqlite3.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <chrono>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <system_error>
+#include <thread>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/input_file.h"
+#include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/database/lock_holder.h"
 
 namespace colmap_graphmatch::sqlite {
@@ -87,6 +94,40 @@ bool DiskIsFull(const std::filesystem::path& path) {
   return !error && space.available < kShmBytes;
 }
 
+// What the operating system said last, if it explains why a file could not be used.
+std::string DescribeSystemError(int error) {
+  switch (error) {
+    case EMFILE:
+    case ENFILE:
+      return std::string(std::strerror(error)) +
+             ". Let the program open more files (ulimit -n), or use fewer threads with "
+             "--SiftMatching.num_threads";
+    default:
+      return "";
+  }
+}
+
+// SQLite does not keep the reason of a write that failed.
+std::string DescribeSizeLimit() {
+  struct rlimit limit = {};
+  if (::getrlimit(RLIMIT_FSIZE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return "";
+  return " Perhaps the file would be larger than the system allows (ulimit -f is " +
+         std::to_string(limit.rlim_cur / 1024) +
+         " KB): raise that limit and run the same command again to go on. Nothing half-written was "
+         "kept.";
+}
+
+void CheckFiles(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path> files = FilesBeside(path);
+  files.push_back(path);
+  for (const std::filesystem::path& file : files) {
+    const std::string reason = WhyNotRegular(file);
+    if (reason.empty()) continue;
+    throw DatabaseError("Cannot open " + path.string() + " as a database: " +
+                        (file == path ? reason : file.string() + ": " + reason) + ".");
+  }
+}
+
 std::string Seconds(double seconds) {
   std::string text = std::to_string(seconds);
   text.resize(text.find('.') + 2);
@@ -95,17 +136,59 @@ std::string Seconds(double seconds) {
 
 }  // namespace
 
+std::vector<std::filesystem::path> FilesBeside(const std::filesystem::path& database_path) {
+  // SQLite follows links and has its files beside where they lead.
+  std::error_code error;
+  std::filesystem::path path = std::filesystem::canonical(database_path, error);
+  if (error) path = database_path;
+  std::vector<std::filesystem::path> files;
+  for (const char* suffix : {"-wal", "-shm", "-journal"})
+    files.emplace_back(path.string() + suffix);
+  return files;
+}
+
+// In place of SQLite's own waiting, which nothing can interrupt.
+struct Connection::Waiting {
+  explicit Waiting(const LockPatience& with) : patience(with) {}
+
+  LockPatience patience;
+  StopRequest::Level give_up_at = StopRequest::kFinishShards;
+  Stopwatch since;  // The first try.
+
+  bool Stops() const {
+    const StopRequest* stop = patience.stop;
+    if (stop == nullptr) return false;
+    return give_up_at == StopRequest::kAbandonShards ? stop->Abandon() : stop->Requested();
+  }
+
+  // SQLite's handler: whether to try again.
+  static int Wait(void* self, int num_tries) {
+    auto* waiting = static_cast<Waiting*>(self);
+    if (num_tries == 0) waiting->since = Stopwatch();
+    const double left = waiting->patience.seconds - waiting->since.Seconds();
+    if (left <= 0 || waiting->Stops()) return 0;
+    constexpr double kLongestPause = 0.05;
+    const double pause = std::min({0.001 * (num_tries + 1), kLongestPause, left});
+    std::this_thread::sleep_for(std::chrono::duration<double>(pause));
+    return 1;
+  }
+};
+
+Connection::~Connection() = default;
+Connection::Connection(Connection&&) noexcept = default;
+
 Connection::Connection(const std::filesystem::path& path, Access access,
-                       double lock_timeout_seconds)
+                       const LockPatience& patience)
     : path_(path),
       lockable_path_(path),
-      lock_timeout_seconds_(lock_timeout_seconds),
+      waiting_(std::make_unique<Waiting>(patience)),
       progress_calls_left_(std::make_unique<int>(kProgressCallsToPrepare)),
       progress_calls_to_run_(kProgressCallsToRun + ProgressCallsToScan(path)),
       db_(nullptr, &sqlite3_close) {
   const int mode = access == Access::kRead        ? SQLITE_OPEN_READONLY
                    : access == Access::kReadWrite ? SQLITE_OPEN_READWRITE
                                                   : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  CheckFiles(path);
   sqlite3* db = nullptr;
   // Absolute: a relative path could begin like a URI.
   const int result = sqlite3_open_v2(std::filesystem::absolute(path).c_str(), &db,
@@ -120,8 +203,7 @@ Connection::Connection(const std::filesystem::path& path, Access access,
         "you can write to.");
   }
   sqlite3_extended_result_codes(db, 1);
-  const double milliseconds = std::clamp(1e3 * lock_timeout_seconds, 0.0, 1e9);
-  sqlite3_busy_timeout(db, static_cast<int>(milliseconds));
+  sqlite3_busy_handler(db, &Waiting::Wait, waiting_.get());
   Harden(db);
   LimitLength(db, path);
   sqlite3_progress_handler(db, kInstructionsPerProgressCall, &CountProgressCall,
@@ -154,6 +236,34 @@ void Connection::AttachReadOnly(const std::filesystem::path& path, const std::st
   lockable_path_ = path;
 }
 
+void Connection::GiveUpAt(StopRequest::Level level) { waiting_->give_up_at = level; }
+
+bool Connection::HasMoved() {
+  int has_moved = 0;
+  sqlite3_file_control(db_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &has_moved);
+  return has_moved != 0;
+}
+
+std::int64_t Connection::DataVersion() {
+  Statement version(*this, "PRAGMA data_version");
+  version.Step();
+  return version.Int(0);
+}
+
+void Connection::CheckPages(const std::string& table) {
+  Statement check(*this, "PRAGMA main.quick_check('" + table + "')");
+  while (check.Step()) {
+    // Other lines speak of values in rows, which no write makes worse.
+    const std::string line = check.Text(0);
+    if (line.rfind("*** in database", 0) != 0) continue;
+    const std::string problem = line.substr(std::min(line.find('\n'), line.size() - 1) + 1);
+    throw DamagedFileError(path_.string() + " is damaged where " + table + " is (" +
+                           problem.substr(0, problem.find('\n')) +
+                           "), and to write to it could destroy more. Nothing was written: "
+                           "`sqlite3 FILE .recover` may save its contents.");
+  }
+}
+
 std::vector<std::string> Connection::Columns(const std::string& table, const std::string& schema) {
   Statement info(*this, "SELECT name FROM pragma_table_info(?1, ?2) ORDER BY cid");
   info.Bind(1, table).Bind(2, schema);
@@ -166,13 +276,20 @@ void Connection::Throw(const std::string& doing) const {
   const int code = db_ ? sqlite3_extended_errcode(db_.get()) : SQLITE_NOMEM;
   const std::string detail = db_ ? sqlite3_errmsg(db_.get()) : "out of memory";
   const std::string what = "Cannot " + doing + " in " + path_.string() + ": ";
+  const std::string system_error = DescribeSystemError(db_ ? sqlite3_system_errno(db_.get()) : 0);
+  const int kind = code & 0xFF;
+  if (!system_error.empty() &&
+      (kind == SQLITE_CANTOPEN || kind == SQLITE_IOERR || kind == SQLITE_FULL)) {
+    throw DatabaseError(what + system_error + ".");
+  }
   // Of that full disk SQLite only says "disk I/O error".
-  const bool disk_is_full = (code & 0xFF) == SQLITE_IOERR && DiskIsFull(path_);
-  switch (disk_is_full ? SQLITE_FULL : code & 0xFF) {
+  const bool disk_is_full = kind == SQLITE_IOERR && DiskIsFull(path_);
+  switch (disk_is_full ? SQLITE_FULL : kind) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
+      if (waiting_->Stops()) throw StoppedError();
       throw DatabaseLockedError(what + "another process kept it locked for " +
-                                Seconds(lock_timeout_seconds_) + " (" +
+                                Seconds(waiting_->patience.seconds) + " (" +
                                 DescribeLockHolders(lockable_path_) +
                                 "). Close that program, or wait longer with "
                                 "--GraphMatching.lock_timeout.");
@@ -197,6 +314,8 @@ void Connection::Throw(const std::string& doing) const {
                           ". SQLite needs to write to the file and to its directory: if they or "
                           "their disk are read-only, copy the database to a place that you can "
                           "write to.");
+    case SQLITE_IOERR:
+      throw DatabaseError(what + detail + "." + DescribeSizeLimit());
     default:
       throw DatabaseError(what + detail + ".");
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/stop_request.h"
 
 struct sqlite3;
 struct sqlite3_blob;
@@ -28,6 +29,19 @@ using Blob = std::vector<std::uint8_t>;
 // kCreate: like kReadWrite, and a file that is not there is made.
 enum class Access { kRead, kReadWrite, kCreate };
 
+// How long a connection waits for locks of other processes, and what ends the wait early.
+struct LockPatience {
+  // NOLINTNEXTLINE(google-explicit-constructor): a number of seconds is one.
+  LockPatience(double for_seconds, const StopRequest* until = nullptr)
+      : seconds(for_seconds), stop(until) {}
+
+  double seconds;
+  const StopRequest* stop;  // If it is raised meanwhile: StoppedError.
+};
+
+// The files that SQLite may have beside a database.
+std::vector<std::filesystem::path> FilesBeside(const std::filesystem::path& database_path);
+
 // The file is no SQLite database, or a damaged one.
 class DamagedFileError : public DatabaseError {
  public:
@@ -36,9 +50,11 @@ class DamagedFileError : public DatabaseError {
 
 class Connection {
  public:
-  // Opens a file. lock_timeout_seconds: how long every later call
-  // waits for locks of other processes.
-  Connection(const std::filesystem::path& path, Access access, double lock_timeout_seconds);
+  // Opens a file. patience: of every later call.
+  Connection(const std::filesystem::path& path, Access access, const LockPatience& patience);
+  ~Connection();
+  Connection(Connection&&) noexcept;
+  Connection& operator=(Connection&&) = delete;
 
   const std::filesystem::path& Path() const { return path_; }
 
@@ -52,6 +68,19 @@ class Connection {
   // then on it is taken to be the one that other programs may have locked.
   void AttachReadOnly(const std::filesystem::path& path, const std::string& schema);
 
+  // At which level of the stop request a wait for a lock ends; kFinishShards at first.
+  void GiveUpAt(StopRequest::Level level);
+
+  // Whether there is another file at the path by now, or none.
+  bool HasMoved();
+
+  // Changes whenever another connection has changed the database.
+  std::int64_t DataVersion();
+
+  // Goes through all pages of a table and throws DamagedFileError if they do not fit together:
+  // rows that are written to such a table may take the place of others. Reads the whole table.
+  void CheckPages(const std::string& table);
+
   // The columns of a table in their order; empty if there is no such table.
   std::vector<std::string> Columns(const std::string& table, const std::string& schema = "main");
 
@@ -63,7 +92,8 @@ class Connection {
 
   std::filesystem::path path_;
   std::filesystem::path lockable_path_;  // The file that other programs may have locked.
-  double lock_timeout_seconds_;
+  struct Waiting;
+  std::unique_ptr<Waiting> waiting_;          // For locks. SQLite has its address.
   std::unique_ptr<int> progress_calls_left_;  // Of the call under way; SQLite has its address.
   int progress_calls_to_run_;
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> db_;

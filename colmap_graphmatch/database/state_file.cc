@@ -1,12 +1,18 @@
 #include "colmap_graphmatch/database/state_file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <array>
 #include <boost/crc.hpp>
+#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <system_error>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/input_file.h"
 #include "colmap_graphmatch/database/lock_holder.h"
 
 namespace colmap_graphmatch {
@@ -96,6 +102,22 @@ void EmptyAndLock(sqlite::Connection& connection) {
   LockAndExamine(connection);
 }
 
+// Gives the state file the owner and the rights of the database, as SQLite does with its files;
+// makes an empty one if there is none. What cannot be done shows when the file is opened.
+void TakeRights(const std::filesystem::path& database_path, const std::filesystem::path& path) {
+  struct stat status = {};
+  if (::stat(database_path.c_str(), &status) != 0 || !WhyNotRegular(path).empty()) return;
+  const mode_t rights = (status.st_mode & 0666U) | S_IRUSR | S_IWUSR;
+  // One that is there is not opened: to close it would lose the lock of another connection.
+  const int made = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, rights);
+  if (made >= 0) ::close(made);
+  struct stat own = {};
+  if (::stat(path.c_str(), &own) != 0) return;
+  if ((own.st_mode & 0777U & ~rights) != 0) ::chmod(path.c_str(), own.st_mode & rights);
+  const bool is_given_away = made >= 0 && ::geteuid() == 0 && own.st_uid != status.st_uid;
+  if (is_given_away && ::chown(path.c_str(), status.st_uid, status.st_gid) != 0) errno = 0;
+}
+
 }  // namespace
 
 std::filesystem::path StateFile::PathFor(const std::filesystem::path& database_path) {
@@ -106,17 +128,21 @@ std::filesystem::path StateFile::PathFor(const std::filesystem::path& database_p
   return path;
 }
 
-StateFile::StateFile(const std::filesystem::path& path, double lock_timeout_seconds)
-    : path_(path), connection_(Open(path, lock_timeout_seconds)) {}
+StateFile::StateFile(const std::filesystem::path& database_path,
+                     const sqlite::LockPatience& patience)
+    : path_(PathFor(database_path)),
+      connection_((TakeRights(database_path, path_), Open(path_, patience))) {}
 
-sqlite::Connection StateFile::Open(const std::filesystem::path& path, double lock_timeout_seconds) {
+sqlite::Connection StateFile::Open(const std::filesystem::path& path,
+                                   const sqlite::LockPatience& patience) {
   const auto something_else = [&path] {
     return DatabaseError(path.string() +
                          " is in the way: it is not a file of this program, which keeps there what "
                          "speeds up the next run. Move it, or delete it.");
   };
   const auto open = [&] {
-    sqlite::Connection connection(path, sqlite::Access::kCreate, lock_timeout_seconds);
+    if (!WhyNotRegular(path).empty()) throw something_else();
+    sqlite::Connection connection(path, sqlite::Access::kCreate, patience);
     // The lock stays when a transaction ends. What is lost in a crash is only worth the time to
     // compute it.
     connection.Execute("PRAGMA locking_mode = EXCLUSIVE");

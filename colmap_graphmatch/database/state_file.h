@@ -27,8 +27,9 @@ class StateFile {
   static std::filesystem::path PathFor(const std::filesystem::path& database_path);
 
   // Opens the file or makes it; one that is of another version, or cannot be opened any more, is
-  // made anew. Throws DatabaseError if something else is in its place.
-  StateFile(const std::filesystem::path& path, double lock_timeout_seconds);
+  // made anew. Throws DatabaseError if something else is in its place. Who may not read the
+  // database may not read this file.
+  StateFile(const std::filesystem::path& database_path, const sqlite::LockPatience& patience);
 
   const std::filesystem::path& Path() const { return path_; }
 
@@ -60,7 +61,8 @@ class StateFile {
   void WriteSeeds(const std::string& key, const std::vector<ImagePair>& seeds);
 
  private:
-  static sqlite::Connection Open(const std::filesystem::path& path, double lock_timeout_seconds);
+  static sqlite::Connection Open(const std::filesystem::path& path,
+                                 const sqlite::LockPatience& patience);
 
   std::filesystem::path path_;
   sqlite::Connection connection_;

@@ -4,10 +4,11 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <system_error>
+#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/input_file.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -141,21 +142,21 @@ Eigen::VectorXf Encode(const cv::Mat& grey) {
 
 }  // namespace
 
-Eigen::VectorXf EncodeGistFile(const std::filesystem::path& path) {
+Eigen::VectorXf EncodeGistFile(const std::filesystem::path& directory, const std::string& name) {
+  const std::string photo = "Cannot read the photo " + (directory / name).string() + ": ";
   cv::Mat grey;
   try {
     // COLMAP does not turn photos by their EXIF data either.
-    grey = cv::imread(path.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    grey = cv::imdecode(ReadPhoto(directory, name),
+                        cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const UnreadableFileError& error) {
+    throw FileError(photo + error.Reason() +
+                    ". Is --image_path the directory that the names in the database start from?");
   } catch (const cv::Exception& error) {
-    throw FileError("Cannot read the photo " + path.string() + ": " + error.what());
+    throw FileError(photo + error.what());
   }
   if (grey.empty()) {
-    std::error_code ignored;
-    throw FileError("Cannot read the photo " + path.string() +
-                    (std::filesystem::exists(path, ignored)
-                         ? ": it is damaged, or of a kind that OpenCV does not know."
-                         : ": there is no such file. Is --image_path the directory that the names "
-                           "in the database start from?"));
+    throw FileError(photo + "it is damaged, or of a kind that OpenCV does not know.");
   }
   return Encode(grey);
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <filesystem>
+#include <string>
 
 namespace colmap_graphmatch {
 
@@ -15,7 +16,7 @@ inline constexpr std::size_t kGistDim = 512;
 // cells, all cells of a filter (row by row) after each other, filters by scale and then
 // orientation; scaled to unit length. All zero for a photo of one colour. Thread-safe.
 //
-// Throws FileError if the photo cannot be read.
-Eigen::VectorXf EncodeGistFile(const std::filesystem::path& path);
+// directory, name: see ReadPhoto. Throws FileError if the photo cannot be read.
+Eigen::VectorXf EncodeGistFile(const std::filesystem::path& directory, const std::string& name);
 
 }  // namespace colmap_graphmatch

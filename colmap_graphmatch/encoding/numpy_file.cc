@@ -12,7 +12,8 @@
 #include <unordered_set>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/base/whole_file.h"
+#include "colmap_graphmatch/base/input_file.h"
+#include "colmap_graphmatch/base/output_file.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -21,10 +22,6 @@ constexpr std::array<char, 6> kMagic = {'\x93', 'N', 'U', 'M', 'P', 'Y'};
 constexpr std::size_t kHeaderAlignment = 64;
 // That of two dimensions has 118 characters. std::regex needs stack for every one.
 constexpr std::size_t kMaxHeaderSize = 1024;
-
-std::filesystem::path NamesPath(std::filesystem::path path) {
-  return path.replace_extension(".txt");
-}
 
 [[noreturn]] void ThrowNot(const std::filesystem::path& path, const std::string& what) {
   throw FileError(path.string() + " " + what +
@@ -103,22 +100,18 @@ void ReadRows(const std::filesystem::path& path, std::ifstream* file, NamedVecto
   }
 }
 
-std::ifstream Open(const std::filesystem::path& path, const std::string& hint) {
-  // A pipe would be waited for, and has no size.
-  std::error_code ignored;
-  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored)) {
-    throw FileError("Cannot read " + path.string() + ": it is not a regular file." + hint);
+std::ifstream OpenNames(const std::filesystem::path& path) {
+  try {
+    return OpenRegularFile(path);
+  } catch (const UnreadableFileError& error) {
+    throw FileError(error.what() +
+                    std::string(" It must have the image names of the rows, one a line, in their "
+                                "order."));
   }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    throw FileError("Cannot read " + path.string() + ": " + std::strerror(errno) + "." + hint);
-  }
-  return file;
 }
 
 std::vector<std::string> ReadNames(const std::filesystem::path& path, std::size_t num_rows) {
-  std::ifstream file =
-      Open(path, " It must have the image names of the rows, one a line, in their order.");
+  std::ifstream file = OpenNames(path);
   std::vector<std::string> names;
   std::unordered_set<std::string> seen;
   for (std::string line; std::getline(file, line);) {
@@ -138,8 +131,12 @@ std::vector<std::string> ReadNames(const std::filesystem::path& path, std::size_
 
 }  // namespace
 
+std::filesystem::path NamesPath(std::filesystem::path path) {
+  return path.replace_extension(".txt");
+}
+
 NamedVectors ReadNamedVectors(const std::filesystem::path& path) {
-  std::ifstream file = Open(path, "");
+  std::ifstream file = OpenRegularFile(path);
   const Header header = ReadHeader(path, &file);
   // A header can ask for any amount of memory.
   const std::uintmax_t begin = static_cast<std::uintmax_t>(file.tellg());

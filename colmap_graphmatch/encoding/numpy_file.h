@@ -14,8 +14,11 @@ struct NamedVectors {
   std::vector<float> rows;  // names.size() x dim, row-major.
 };
 
+// Where the names are: the extension is .txt instead.
+std::filesystem::path NamesPath(std::filesystem::path path);
+
 // Reads a two-dimensional NumPy array (format versions 1 to 3, little-endian float32 or float64, C
-// order) and the names of its rows, one a line, in the file with the extension .txt instead. Throws
+// order) and the names of its rows, one a line, at NamesPath. Throws
 // FileError: a file cannot be read or is something else, a number is not finite, names are repeated
 // or are not as many as rows.
 NamedVectors ReadNamedVectors(const std::filesystem::path& path);

@@ -12,15 +12,8 @@ namespace colmap_graphmatch {
 
 DescriptorCache::DescriptorCache(std::size_t max_bytes, std::size_t num_readers,
                                  const std::function<Reader()>& make_reader)
-    : max_bytes_(max_bytes) {
-  try {
-    for (std::size_t i = 0; i < num_readers; ++i) {
-      threads_.emplace_back([this, make_reader] { Read(make_reader); });
-    }
-  } catch (...) {
-    Close();
-    throw;
-  }
+    : max_bytes_(max_bytes), make_reader_(make_reader) {
+  threads_ = std::make_unique<ThreadGroup>(num_readers, [this] { ReadRequested(); });
 }
 
 DescriptorCache::~DescriptorCache() { Close(); }
@@ -31,7 +24,7 @@ void DescriptorCache::Close() {
     closing_ = true;
     requested_.notify_all();
   }
-  for (std::thread& thread : threads_) thread.join();
+  threads_->Join();
 }
 
 DescriptorCache::Handle DescriptorCache::Request(ImageId image) {
@@ -54,6 +47,19 @@ DescriptorCache::Handle DescriptorCache::Request(ImageId image) {
 
 const MatchingFeatures& DescriptorCache::Wait(const Handle& handle) {
   const Entry& entry = *handle.entry_;
+  if (threads_->Size() == 0) {
+    const std::lock_guard<std::mutex> reading(reading_);
+    while (true) {
+      std::shared_ptr<Entry> next;
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (entry.ready || to_read_.empty()) break;
+        next = std::move(to_read_.front());
+        to_read_.pop_front();
+      }
+      Read(&reader_, std::move(next));
+    }
+  }
   std::unique_lock<std::mutex> lock(mutex_);
   read_.wait(lock, [&] { return entry.ready; });
   if (entry.exception) std::rethrow_exception(entry.exception);
@@ -70,7 +76,7 @@ std::size_t DescriptorCache::MaxBytesKept() const {
   return max_bytes_kept_;
 }
 
-void DescriptorCache::Read(const std::function<Reader()>& make_reader) {
+void DescriptorCache::ReadRequested() {
   Reader reader;
   while (true) {
     std::shared_ptr<Entry> entry;
@@ -81,25 +87,29 @@ void DescriptorCache::Read(const std::function<Reader()>& make_reader) {
       entry = std::move(to_read_.front());
       to_read_.pop_front();
     }
-    MatchingFeatures features;
-    std::exception_ptr exception;
-    try {
-      if (!reader) reader = make_reader();
-      features = reader(entry->image);
-    } catch (...) {
-      exception = std::current_exception();
-    }
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++num_reads_;
-    entry->features = std::move(features);
-    entry->exception = std::move(exception);
-    entry->ready = true;
-    Keep(entry);
-    // Whoever waits is the last to hold it: an exception is not to end on this thread while it is
-    // being read on another.
-    entry.reset();
-    read_.notify_all();
+    Read(&reader, std::move(entry));
   }
+}
+
+void DescriptorCache::Read(Reader* reader, std::shared_ptr<Entry> entry) {
+  MatchingFeatures features;
+  std::exception_ptr exception;
+  try {
+    if (!*reader) *reader = make_reader_();
+    features = (*reader)(entry->image);
+  } catch (...) {
+    exception = std::current_exception();
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++num_reads_;
+  entry->features = std::move(features);
+  entry->exception = std::move(exception);
+  entry->ready = true;
+  Keep(entry);
+  // Whoever waits is the last to hold it: an exception is not to end on this thread while it is
+  // being read on another.
+  entry.reset();
+  read_.notify_all();
 }
 
 void DescriptorCache::Keep(const std::shared_ptr<Entry>& entry) {

@@ -10,10 +10,10 @@
 #include <list>
 #include <memory>
 #include <mutex>
-#include <thread>
 #include <unordered_map>
 #include <vector>
 
+#include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/matching/top_two.h"
 
@@ -44,7 +44,8 @@ class DescriptorCache {
 
   // max_bytes: of the features kept for reuse; those that somebody holds count on top once they are
   // no longer kept, so that any bound works, 0 included. make_reader is called once on each of the
-  // num_readers threads, and what it returns on that thread alone.
+  // num_readers threads, and what it returns on that thread alone. Where the system gives no thread
+  // at all, whoever waits for an image reads it, one at a time.
   DescriptorCache(std::size_t max_bytes, std::size_t num_readers,
                   const std::function<Reader()>& make_reader);
   ~DescriptorCache();
@@ -75,7 +76,8 @@ class DescriptorCache {
   using Entries = std::list<std::shared_ptr<Entry>>;
 
   void Close();
-  void Read(const std::function<Reader()>& make_reader);
+  void ReadRequested();  // On a thread of its own.
+  void Read(Reader* reader, std::shared_ptr<Entry> entry);
   void Keep(const std::shared_ptr<Entry>& entry);
 
   const std::size_t max_bytes_;
@@ -89,7 +91,10 @@ class DescriptorCache {
   std::size_t max_bytes_kept_ = 0;
   std::size_t num_reads_ = 0;
   bool closing_ = false;
-  std::vector<std::thread> threads_;
+  const std::function<Reader()> make_reader_;
+  std::mutex reading_;  // Of the reader of those that wait.
+  Reader reader_;
+  std::unique_ptr<ThreadGroup> threads_;
 
  public:
   class Handle {

@@ -1,26 +1,17 @@
 #include "colmap_graphmatch/pipeline/finished_graph.h"
 
 #include <algorithm>
-#include <array>
 #include <boost/algorithm/string/classification.hpp>
 #include <boost/algorithm/string/split.hpp>
 #include <boost/lexical_cast/try_lexical_convert.hpp>
-#include <fstream>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/input_file.h"
 #include "colmap_graphmatch/pipeline/text_file.h"
 
 namespace colmap_graphmatch {
 namespace {
-
-bool IsSqlite(const std::filesystem::path& path) {
-  constexpr std::array<char, 16> kMagic = {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f',
-                                           'o', 'r', 'm', 'a', 't', ' ', '3', '\0'};
-  std::array<char, kMagic.size()> begin = {};
-  std::ifstream file(path, std::ios::binary);
-  return file.read(begin.data(), begin.size()) && begin == kMagic;
-}
 
 class Reader {
  public:
@@ -53,8 +44,9 @@ class Reader {
   FinishedGraph graph_;
 };
 
-void ReadDatabase(const std::filesystem::path& path, double lock_timeout_seconds, Reader* reader) {
-  Database database(path, sqlite::Access::kRead, lock_timeout_seconds);
+void ReadDatabase(const std::filesystem::path& path, const sqlite::LockPatience& patience,
+                  Reader* reader) {
+  Database database(path, sqlite::Access::kRead, patience);
   std::unordered_map<ImageId, std::string> names;
   for (const ImageRecord& image : database.ReadImages()) names[image.id] = image.name;
   const std::unordered_map<ImagePair, std::size_t> num_matches = database.ReadNumMatches();
@@ -68,11 +60,11 @@ void ReadDatabase(const std::filesystem::path& path, double lock_timeout_seconds
   }
 }
 
-void ReadText(const std::filesystem::path& path, Reader* reader) {
+void ReadList(const std::filesystem::path& path, const StopRequest* stop, Reader* reader) {
   constexpr int kUncalibrated = 2;  // Any configuration that an edge may have.
   bool may_be_header = true;
   for (const Line& line :
-       ReadLines(path, "edges", "lines of two image names and the number of inliers")) {
+       ReadLines(path, "edges", "lines of two image names and the number of inliers", stop)) {
     std::vector<std::string> fields;
     boost::split(fields, line.text, boost::is_any_of("\t"));
     std::uint32_t num_inliers = 0;
@@ -101,12 +93,12 @@ void ReadText(const std::filesystem::path& path, Reader* reader) {
 
 FinishedGraph ReadFinishedGraph(const std::filesystem::path& path,
                                 const std::vector<ImageRecord>& images, int min_num_inliers,
-                                double lock_timeout_seconds) {
+                                const sqlite::LockPatience& patience) {
   Reader reader(images, min_num_inliers);
-  if (IsSqlite(path)) {
-    ReadDatabase(path, lock_timeout_seconds, &reader);
+  if (IsSqliteFile(path)) {
+    ReadDatabase(path, patience, &reader);
   } else {
-    ReadText(path, &reader);
+    ReadList(path, patience.stop, &reader);
   }
   FinishedGraph graph = reader.Finish();
   if (graph.num_edges == 0) {

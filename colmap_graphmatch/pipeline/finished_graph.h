@@ -29,6 +29,6 @@ struct FinishedGraph {
 // Throws FileError (the text: what, in which line), DatabaseError.
 FinishedGraph ReadFinishedGraph(const std::filesystem::path& path,
                                 const std::vector<ImageRecord>& images, int min_num_inliers,
-                                double lock_timeout_seconds);
+                                const sqlite::LockPatience& patience);
 
 }  // namespace colmap_graphmatch

@@ -82,8 +82,8 @@ GraphMatchOptions MakeGraphOptions(const PipelineOptions& options) {
 
 std::vector<ImagePair> ReadListedPairs(const std::filesystem::path& path,
                                        const std::vector<ImageRecord>& images,
-                                       PipelineObserver& observer) {
-  PairList list = ReadPairList(path, images);
+                                       const StopRequest& stop, PipelineObserver& observer) {
+  PairList list = ReadPairList(path, images, &stop);
   WarnOfSkippedLines(list, path, "two different images", observer);
   return std::move(list.pairs);
 }
@@ -138,10 +138,11 @@ struct Job {
   Database& database;
   RunState& state;
   const std::vector<ImageRecord>& all_images;
-  const std::vector<ImageRecord>& images;  // Those with features.
-  std::vector<ImagePair> listed_pairs;     // Of match_list_path.
-  std::vector<ImageId> seeking;            // Of image_list_path.
-  std::function<double()> seconds;         // Since the start of the run.
+  const std::vector<ImageRecord>& images;             // Those with features,
+  const std::vector<ImageFingerprint>& fingerprints;  // and of which.
+  std::vector<ImagePair> listed_pairs;                // Of match_list_path.
+  std::vector<ImageId> seeking;                       // Of image_list_path.
+  std::function<double()> seconds;                    // Since the start of the run.
 };
 
 using OnProgress = std::function<void(const LoopProgress&)>;
@@ -171,8 +172,8 @@ RankedImages Rank(const Job& job, const std::vector<VerifiedPair>& known, Pipeli
   ImageRankingOptions options = job.options.ranking;
   options.vectors.seed = job.options.seed;
   options.vectors.gmm.seed = job.options.seed;
-  return RankImages(options, job.database, job.images, known, job.state, job.threads, job.stop,
-                    job.observer, &result->preprocessing_seconds);
+  return RankImages(options, job.database, job.images, job.fingerprints, known, job.state,
+                    job.threads, job.stop, job.observer, &result->preprocessing_seconds);
 }
 
 // Lists that are cut short by a budget are taken from their beginning.
@@ -320,7 +321,7 @@ ReplayVerifier MakeReplayVerifier(const Job& job) {
   const PipelineOptions& options = job.options;
   FinishedGraph graph =
       ReadFinishedGraph(options.replay_path, job.images, options.verification.min_num_inliers,
-                        options.verification.lock_timeout);
+                        {options.verification.lock_timeout, &job.stop});
   WarnOfSkippedLines(graph, options.replay_path, "two different images", job.observer);
   job.observer.OnInfo("Replays the matching graph of " + options.replay_path.string() + ", with " +
                       std::to_string(graph.num_edges) +
@@ -345,20 +346,28 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
                   options.strategy == PipelineOptions::Strategy::kExhaustive;
   ThreadPool threads(options.num_threads);
   result.num_threads = threads.NumThreads();
+  const int num_wanted = EffectiveNumThreads(options.num_threads);
+  if (threads.NumThreads() < num_wanted) {
+    observer.OnWarning("The system lets this program start fewer threads than the " +
+                       std::to_string(num_wanted) +
+                       " that are wanted (ulimit -u, or a limit of the container): it works with "
+                       "what it gets, and is slower.");
+  }
 
   const bool reads_only = result.replayed || options.dry_run;
+  const sqlite::LockPatience patience(options.verification.lock_timeout, &stop);
   Database database(options.database_path,
-                    reads_only ? sqlite::Access::kRead : sqlite::Access::kReadWrite,
-                    options.verification.lock_timeout);
+                    reads_only ? sqlite::Access::kRead : sqlite::Access::kReadWrite, patience);
   const std::vector<ImageRecord> all_images = database.ReadImages();
   if (!reads_only) database.CheckWritable();
   const auto info = [&](const std::string& message) { observer.OnInfo(message); };
   const auto warn = [&](const std::string& warning) { observer.OnWarning(warning); };
   // Nothing of a replay is for the next run on these photos.
-  RunState state = result.replayed ? RunState()
-                                   : RunState(options.database_path,
-                                              options.verification.lock_timeout, stop, info, warn);
+  RunState state =
+      result.replayed ? RunState() : RunState(options.database_path, patience, info, warn);
   const std::vector<ImageRecord> images = WithFeatures(all_images);
+  const std::vector<ImageFingerprint> fingerprints = database.ReadFingerprints(images);
+  database.ExpectFeatures(images, fingerprints);
   result.num_images = all_images.size();
   result.num_images_without_features = all_images.size() - images.size();
   if (images.size() < all_images.size()) {
@@ -372,15 +381,14 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
 
   std::optional<TestLog> log;
   if (!options.test_log_path.empty()) log.emplace(options.test_log_path, all_images);
-  Job job = {
-      options, stop, observer, threads, database, state, all_images, images, {}, {}, [&total] {
-        return total.Seconds();
-      }};
+  Job job = {options,      stop,  observer,   threads,
+             database,     state, all_images, images,
+             fingerprints, {},    {},         [&total] { return total.Seconds(); }};
   if (!options.match_list_path.empty()) {
-    job.listed_pairs = ReadListedPairs(options.match_list_path, all_images, observer);
+    job.listed_pairs = ReadListedPairs(options.match_list_path, all_images, stop, observer);
   }
   if (!options.image_list_path.empty()) {
-    ImageList list = ReadImageList(options.image_list_path, images);
+    ImageList list = ReadImageList(options.image_list_path, images, &stop);
     WarnOfSkippedLines(list, options.image_list_path, "an image", observer);
     job.seeking = std::move(list.images);
   }
@@ -404,6 +412,7 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
     result.modelled_seconds = verifier.ModelledSeconds();
   } else {
     MatchWithColmap(job, on_progress, &record, &result);
+    database.CheckInPlace();
   }
   if (log) log->Close();
   result.total_seconds = total.Seconds();

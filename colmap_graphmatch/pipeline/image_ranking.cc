@@ -206,13 +206,13 @@ void ImageRankingOptions::Check() const {
 
 RankedImages RankImages(const ImageRankingOptions& options, Database& database,
                         const std::vector<ImageRecord>& images,
+                        const std::vector<ImageFingerprint>& fingerprints,
                         const std::vector<VerifiedPair>& known, RunState& state,
                         ThreadPool& threads, const StopRequest& stop, PipelineObserver& observer,
                         ImageRankingSeconds* seconds) {
-  const std::vector<ImageFingerprint> fingerprints = database.ReadFingerprints(images);
   if (!options.ranking_path.empty()) {
-    RankedLists lists =
-        Timed(&seconds->ranking, [&] { return ReadRankedLists(options.ranking_path, images); });
+    RankedLists lists = Timed(&seconds->ranking,
+                              [&] { return ReadRankedLists(options.ranking_path, images, &stop); });
     WarnOfSkippedLines(lists, options.ranking_path, "two images", observer);
     state.SelectGiven("ranked lists " + lists.checksum, fingerprints);
     return {images, std::move(lists.ranking)};

@@ -46,11 +46,12 @@ struct RankedImages {
   std::unique_ptr<Ranking> ranking;  // and their ranking: a vertex each.
 };
 
-// From the features to ranked lists: the pre-processing of the paper. images: all with features.
-// known: the pairs that are in the database, of which a warning may speak. What an earlier run kept
-// is used, and kept for the next.
+// From the features to ranked lists: the pre-processing of the paper. images: all with features,
+// and their fingerprints. known: the pairs that are in the database, of which a warning may speak.
+// What an earlier run kept is used, and kept for the next.
 RankedImages RankImages(const ImageRankingOptions& options, Database& database,
                         const std::vector<ImageRecord>& images,
+                        const std::vector<ImageFingerprint>& fingerprints,
                         const std::vector<VerifiedPair>& known, RunState& state,
                         ThreadPool& threads, const StopRequest& stop, PipelineObserver& observer,
                         ImageRankingSeconds* seconds);

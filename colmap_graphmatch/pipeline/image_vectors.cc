@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <future>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -34,6 +35,16 @@ Random ImageRandom(const ImageVectorOptions& options, RandomStage stage, ImageId
   return Random({options.seed, static_cast<std::uint64_t>(stage), image_id});
 }
 
+// On a thread of its own, or, if the system gives none, when it is asked for.
+template <typename Function>
+auto Start(Function function) -> std::future<decltype(function())> {
+  try {
+    return std::async(std::launch::async, function);
+  } catch (const std::system_error&) {
+    return std::async(std::launch::deferred, function);
+  }
+}
+
 // Calls body(i, what select(image i) returned) for every image, in parallel, while the next images
 // are read.
 template <typename Select, typename Body>
@@ -50,7 +61,7 @@ void ForEachImage(const std::vector<ImageRecord>& images, ThreadPool& threads,
   for (std::size_t first = 0; first < images.size(); first += kImagesPerChunk) {
     stop.ThrowIfRequested();
     std::future<std::vector<SelectedDescriptors>> next =
-        std::async(std::launch::async, read_chunk, first + kImagesPerChunk);
+        Start([&] { return read_chunk(first + kImagesPerChunk); });
     threads.ParallelFor(chunk.size(), [&](std::size_t i) { body(first + i, chunk[i]); });
     chunk = next.get();
   }
@@ -151,7 +162,7 @@ std::vector<float> EncodeImages(const ImageVectorOptions& options, const VectorM
   if (options.descriptor == ImageVectorOptions::Descriptor::kGist) {
     threads.ParallelFor(images.size(), [&](std::size_t i) {
       stop.ThrowIfRequested();
-      store(i, EncodeGistFile(options.image_path / images[i].name));
+      store(i, EncodeGistFile(options.image_path, images[i].name));
     });
     return vectors;
   }

@@ -8,12 +8,14 @@
 
 namespace colmap_graphmatch {
 
-PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
+PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images,
+                      const StopRequest* stop) {
   const std::unordered_map<std::string, ImageId> ids = IdsByName(images);
   std::size_t longest_name = 0;
   for (const auto& [name, id] : ids) longest_name = std::max(longest_name, name.size());
   PairList list;
-  for (const auto& [line_number, line] : ReadLines(path, "image pairs", "two image names a line")) {
+  for (const auto& [line_number, line] :
+       ReadLines(path, "image pairs", "two image names a line", stop)) {
     // Every way to cut it into a name, another, and what may follow, e.g. a score.
     const char separator = line.find('\t') != std::string::npos ? '\t' : ' ';
     // No two names reach further, and a line may be a whole file.
@@ -54,10 +56,11 @@ PairList ReadPairList(const std::filesystem::path& path, const std::vector<Image
   return list;
 }
 
-ImageList ReadImageList(const std::filesystem::path& path, const std::vector<ImageRecord>& images) {
+ImageList ReadImageList(const std::filesystem::path& path, const std::vector<ImageRecord>& images,
+                        const StopRequest* stop) {
   const std::unordered_map<std::string, ImageId> ids = IdsByName(images);
   ImageList list;
-  for (const Line& line : ReadLines(path, "images", "an image name a line")) {
+  for (const Line& line : ReadLines(path, "images", "an image name a line", stop)) {
     const auto found = ids.find(line.text);
     if (found != ids.end()) {
       list.images.push_back(found->second);

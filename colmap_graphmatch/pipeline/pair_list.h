@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/database.h"
 
@@ -24,7 +25,8 @@ struct PairList {
 // with # are comments. Names may contain spaces (there, COLMAP fails) as long as only one way to
 // cut the line gives two images. Throws FileError if the file cannot be read, if a line can be cut
 // in several ways, or if none of its lines names a pair.
-PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
+PairList ReadPairList(const std::filesystem::path& path, const std::vector<ImageRecord>& images,
+                      const StopRequest* stop = nullptr);
 
 struct ImageList {
   std::vector<ImageId> images;  // Ascending, each once.
@@ -37,6 +39,7 @@ struct ImageList {
 // Reads a list of images as vocab_tree_matcher takes it (VocabTreeMatching.match_list_path): a name
 // a line; empty lines and those that begin with # are comments. Throws FileError if the file cannot
 // be read, or if none of its lines names an image.
-ImageList ReadImageList(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
+ImageList ReadImageList(const std::filesystem::path& path, const std::vector<ImageRecord>& images,
+                        const StopRequest* stop = nullptr);
 
 }  // namespace colmap_graphmatch

@@ -14,7 +14,7 @@
 namespace colmap_graphmatch {
 
 RankedLists ReadRankedLists(const std::filesystem::path& path,
-                            const std::vector<ImageRecord>& images) {
+                            const std::vector<ImageRecord>& images, const StopRequest* stop) {
   std::unordered_map<std::string, Vertex> vertices;
   for (const ImageRecord& image : images) {
     vertices.emplace(image.name, static_cast<Vertex>(vertices.size()));
@@ -25,7 +25,8 @@ RankedLists ReadRankedLists(const std::filesystem::path& path,
   std::size_t num_read = 0;
   for (const Line& line : ReadLines(path, "ranked images",
                                     "an image, another one and a score, "
-                                    "separated by tabs, a line")) {
+                                    "separated by tabs, a line",
+                                    stop)) {
     crc.process_bytes(line.text.data(), line.text.size());
     std::vector<std::string> fields;
     boost::split(fields, line.text, boost::is_any_of("\t"));

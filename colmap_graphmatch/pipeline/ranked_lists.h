@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/ranking/list_ranking.h"
 
@@ -21,6 +22,7 @@ struct RankedLists {
 // image, another one and a score, separated by tabs; greater scores are nearer. images: those with
 // features. Throws FileError.
 RankedLists ReadRankedLists(const std::filesystem::path& path,
-                            const std::vector<ImageRecord>& images);
+                            const std::vector<ImageRecord>& images,
+                            const StopRequest* stop = nullptr);
 
 }  // namespace colmap_graphmatch

@@ -25,27 +25,18 @@ std::string Checksum(const void* data, std::size_t size) {
 
 }  // namespace
 
-RunState::RunState(const std::filesystem::path& database_path, double lock_timeout_seconds,
-                   const StopRequest& stop, const Say& info, const Say& warn)
+RunState::RunState(const std::filesystem::path& database_path, const sqlite::LockPatience& patience,
+                   const Say& info, const Say& warn)
     : warn_(warn) {
-  // SQLite's own waiting cannot be interrupted.
-  constexpr double kSecondsATry = 0.2;
-  const std::filesystem::path path = StateFile::PathFor(database_path);
-  const Stopwatch waiting;
   try {
-    for (bool told = false; !file_; told = true) {
-      stop.ThrowIfRequested();
-      const double left = lock_timeout_seconds - waiting.Seconds();
-      try {
-        file_ = std::make_unique<StateFile>(path, std::clamp(left, 0.0, told ? kSecondsATry : 0.0));
-      } catch (const DatabaseLockedError&) {
-        if (left <= 0) throw;
-        if (!told) {
-          info("Another graphmatch_matcher works on this database; waiting for it, up to " +
-               std::to_string(static_cast<long>(lock_timeout_seconds)) +
-               " s (--GraphMatching.lock_timeout).");
-        }
-      }
+    try {
+      file_ = std::make_unique<StateFile>(database_path, 0);
+    } catch (const DatabaseLockedError&) {
+      if (patience.seconds <= 0) throw;
+      info("Another graphmatch_matcher works on this database; waiting for it, up to " +
+           std::to_string(static_cast<long>(patience.seconds)) +
+           " s (--GraphMatching.lock_timeout).");
+      file_ = std::make_unique<StateFile>(database_path, patience);
     }
     usable_ = true;
   } catch (const DatabaseLockedError&) {

@@ -25,10 +25,10 @@ class RunState {
   // Keeps nothing and finds nothing.
   RunState() = default;
 
-  // Waits for another run on the same database, up to lock_timeout_seconds. Throws
+  // Waits for another run on the same database. Throws
   // DatabaseLockedError if it is still at work then; StoppedError if stop asks for it.
-  RunState(const std::filesystem::path& database_path, double lock_timeout_seconds,
-           const StopRequest& stop, const Say& info, const Say& warn);
+  RunState(const std::filesystem::path& database_path, const sqlite::LockPatience& patience,
+           const Say& info, const Say& warn);
 
   // Chooses what is kept: vectors of these images under these options. photos_checksum: of the
   // files, for GIST.

@@ -1,7 +1,6 @@
 #include "colmap_graphmatch/pipeline/test_log.h"
 
 #include <array>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 
@@ -21,15 +20,9 @@ std::string CsvField(const std::string& text) {
 }  // namespace
 
 TestLog::TestLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images)
-    : path_(path), file_(path, std::ios::trunc) {
+    : path_(path), file_(path, GrowingFile::Mode::kAnew) {
   for (const ImageRecord& image : images) names_[image.id] = CsvField(image.name);
   file_ << "test,seconds,stage,iteration,image1,image2,inliers,edge\n" << std::flush;
-  if (!file_) ThrowCannotWrite();
-}
-
-void TestLog::ThrowCannotWrite() const {
-  throw FileError("Cannot write the log of tests " + path_.string() + ": " + std::strerror(errno) +
-                  ".");
 }
 
 void TestLog::Write(const LoopProgress& progress, double seconds) {
@@ -43,8 +36,10 @@ void TestLog::Write(const LoopProgress& progress, double seconds) {
 }
 
 void TestLog::Close() {
-  file_.close();
-  if (!file_) ThrowCannotWrite();
+  file_.flush();
+  if (file_.Error() == 0) return;
+  throw FileError("Cannot write the log of tests " + path_.string() + ": " +
+                  std::strerror(file_.Error()) + ".");
 }
 
 }  // namespace colmap_graphmatch

@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/base/output_file.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
 
@@ -25,10 +25,8 @@ class TestLog {
   void Close();
 
  private:
-  [[noreturn]] void ThrowCannotWrite() const;
-
   std::filesystem::path path_;
-  std::ofstream file_;
+  GrowingFile file_;
   std::map<ImageId, std::string> names_;  // As fields of CSV.
   std::size_t num_written_ = 0;
 };

@@ -1,33 +1,38 @@
 #include "colmap_graphmatch/pipeline/text_file.h"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <system_error>
+#include <algorithm>
+#include <string_view>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/input_file.h"
 
 namespace colmap_graphmatch {
 
 std::vector<Line> ReadLines(const std::filesystem::path& path, const std::string& kind,
-                            const std::string& content) {
-  std::error_code ignored;
-  std::ifstream file(path);
-  const int reason = errno;
-  if (!file || std::filesystem::is_directory(path, ignored)) {
+                            const std::string& content, const StopRequest* stop) {
+  std::string text;
+  try {
+    text = ReadText(path, stop);
+  } catch (const UnreadableFileError& error) {
     throw FileError("Cannot read the list of " + kind + " " + path.string() + ": " +
-                    std::strerror(file ? EISDIR : reason) + ". Give a file with " + content + ".");
+                    error.Reason() + ". Give a file with " + content + ".");
   }
   std::vector<Line> lines;
   std::size_t number = 0;
-  for (std::string line; std::getline(file, line);) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  std::size_t next = text.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0
+                         ? kByteOrderMark.size()
+                         : std::size_t{0};
+  while (next < text.size()) {
+    const std::size_t end = std::min(text.find('\n', next), text.size());
+    const std::string_view line = std::string_view(text).substr(next, end - next);
+    next = end + 1;
     ++number;
-    if (number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);  // A byte order mark.
     const std::size_t begin = line.find_first_not_of(" \t\r");
-    if (begin == std::string::npos || line[begin] == '#') continue;
-    lines.push_back({number, line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin)});
+    if (begin == std::string_view::npos || line[begin] == '#') continue;
+    lines.push_back(
+        {number, std::string(line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin))});
   }
-  if (file.bad()) throw FileError("Cannot read " + path.string() + " to its end.");
   if (lines.empty()) {
     throw FileError("The list of " + kind + " " + path.string() + " is empty.");
   }

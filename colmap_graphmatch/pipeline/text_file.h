@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/database/database.h"
 
 namespace colmap_graphmatch {
@@ -17,9 +18,10 @@ struct Line {
 };
 
 // The lines of a list, without empty ones and those that start with '#'. kind and content say in
-// errors what the list is. Throws FileError if the file cannot be read or has no such line.
+// errors what the list is. Throws FileError if the file cannot be read or has no such line, and
+// StoppedError (see ReadText).
 std::vector<Line> ReadLines(const std::filesystem::path& path, const std::string& kind,
-                            const std::string& content);
+                            const std::string& content, const StopRequest* stop = nullptr);
 
 // The images with features.
 std::unordered_map<std::string, ImageId> IdsByName(const std::vector<ImageRecord>& images);

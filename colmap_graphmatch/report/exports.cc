@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "colmap_graphmatch/base/whole_file.h"
+#include "colmap_graphmatch/base/output_file.h"
 #include "colmap_graphmatch/report/matching_graph_view.h"
 
 namespace colmap_graphmatch {
@@ -77,19 +77,23 @@ std::vector<ImagePair> SortedPairs(const PipelineResult& result) {
 
 }  // namespace
 
-bool WritePairList(const std::filesystem::path& path, const PipelineResult& result) {
+PairListNames WritePairList(const std::filesystem::path& path, const PipelineResult& result) {
   const ImageIndex index(result.images);
-  bool any_spaces = false;
+  PairListNames names;
   WriteWholeFile(path, [&](std::ostream& file) {
     for (const ImagePair& pair : SortedPairs(result)) {
       const std::string& name1 = result.images[index.Of(pair.id1)].name;
       const std::string& name2 = result.images[index.Of(pair.id2)].name;
+      if ((name1 + name2).find_first_of("\n\r\t") != std::string::npos) {
+        ++names.num_left_out;
+        continue;
+      }
       const bool spaces = (name1 + name2).find(' ') != std::string::npos;
-      any_spaces = any_spaces || spaces;
+      names.any_spaces = names.any_spaces || spaces;
       file << name1 << (spaces ? '\t' : ' ') << name2 << '\n';
     }
   });
-  return any_spaces;
+  return names;
 }
 
 void WriteGraph(const std::filesystem::path& path, const PipelineResult& result) {

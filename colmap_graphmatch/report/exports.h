@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
@@ -10,10 +11,16 @@ namespace colmap_graphmatch {
 // (PipelineOptions::keep_details), or are those of a dry run. The functions throw FileError if the
 // file cannot be written; then what was there before is still there.
 
+// What of the names of images such a list cannot hold as it should.
+struct PairListNames {
+  bool any_spaces = false;       // Neither of those programs can read such lines.
+  std::size_t num_left_out = 0;  // Pairs with a line end or a tab in a name.
+};
+
 // Two names a line, as COLMAP's matches_importer and hloc read them: the edges, those with the most
 // inliers first, or the candidates of a dry run, nearest first. A space between them, or a tab if
-// one of them has spaces; true if there are such names, which neither of those programs can read.
-bool WritePairList(const std::filesystem::path& path, const PipelineResult& result);
+// one of them has spaces.
+PairListNames WritePairList(const std::filesystem::path& path, const PipelineResult& result);
 
 // The matching graph: the images with their ids, names and components, the edges with their numbers
 // of inliers. GraphML, or the language of Graphviz if the path ends in .dot or .gv.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -10,7 +9,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
-#include <system_error>
+
+#include "colmap_graphmatch/base/input_file.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -79,22 +79,6 @@ void AddBestConnectedImages(const Json& report, std::size_t num_images, Choice* 
   }
 }
 
-bool StaysBelow(const std::filesystem::path& name) {
-  return name.is_relative() && *name.lexically_normal().begin() != "..";
-}
-
-// Empty if the file cannot be read.
-std::vector<unsigned char> ReadBytes(const std::filesystem::path& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return {};
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error || size == 0) return {};
-  std::vector<unsigned char> bytes(size);
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  return file ? bytes : std::vector<unsigned char>();
-}
-
 // Decoding JPEG at an eighth of the size takes a fraction of the time. Of a photo that is too small
 // for that, all pixels are decoded.
 cv::Mat Decode(const std::vector<unsigned char>& file) {
@@ -104,12 +88,10 @@ cv::Mat Decode(const std::vector<unsigned char>& file) {
 }
 
 // Empty if there is no image in the file that can be decoded.
-std::string MakeThumbnail(const std::filesystem::path& path) {
-  const std::vector<unsigned char> file = ReadBytes(path);
-  if (file.empty()) return "";
+std::string MakeThumbnail(const std::filesystem::path& directory, const std::string& name) {
   std::vector<unsigned char> jpeg;
   try {
-    cv::Mat image = Decode(file);
+    cv::Mat image = Decode(ReadPhoto(directory, name));
     if (image.empty()) return "";
     const double scale = static_cast<double>(kLongestSide) / std::max(image.rows, image.cols);
     if (scale < 1) {
@@ -118,6 +100,8 @@ std::string MakeThumbnail(const std::filesystem::path& path) {
       cv::resize(image, image, size, 0, 0, cv::INTER_AREA);
     }
     cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  } catch (const UnreadableFileError&) {
+    return "";
   } catch (const cv::Exception&) {
     // What OpenCV says of files that are damaged or have too many pixels.
     return "";
@@ -151,9 +135,8 @@ std::map<std::size_t, std::string> MakeThumbnails(
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   std::vector<std::string> files(images.size());
   threads.ParallelFor(images.size(), [&](std::size_t i) {
-    const std::filesystem::path name = std::filesystem::u8path(images[i].second);
-    if (stop.Requested() || !StaysBelow(name)) return;
-    files[i] = MakeThumbnail(image_path / name);
+    if (stop.Requested()) return;
+    files[i] = MakeThumbnail(image_path, images[i].second);
   });
   std::map<std::size_t, std::string> thumbnails;
   for (std::size_t i = 0; i < images.size(); ++i) {

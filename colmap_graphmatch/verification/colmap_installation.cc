@@ -53,11 +53,9 @@ std::filesystem::path FindExecutable(const std::string& colmap_path) {
 
 std::string Output(const std::vector<std::string>& command, const std::filesystem::path& path,
                    const StopRequest& stop) {
-  const SubprocessResult result =
-      RunSubprocess(command, path, kHelpTimeoutSeconds, [&stop] { return stop.Requested(); });
-  stop.ThrowIfRequested();
+  const SubprocessResult result = RunTwice(command, path, kHelpTimeoutSeconds, stop);
   // Even after success: help that is cut off would seem to lack options.
-  ThrowIfDiskIsFull(path.parent_path());
+  ThrowIfUnusable(path.parent_path());
   if (!result.Succeeded()) {
     const std::string lines = LastLines(path, 5);
     throw ColmapError("`" + command[0] + " " + command[1] + "` " + result.Describe() +

@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <boost/asio/post.hpp>
-#include <boost/asio/thread_pool.hpp>
+#include <cerrno>
 #include <charconv>
 #include <condition_variable>
+#include <cstring>
 #include <deque>
 #include <exception>
 #include <fstream>
+#include <iterator>
 #include <mutex>
+#include <unordered_set>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -126,12 +128,30 @@ struct ColmapVerifier::Batch {
   std::condition_variable changed;            // finished, num_workers or abort.
   std::deque<std::vector<ImagePair>> shards;  // Not yet taken.
   std::deque<Part> finished;                  // Not yet merged.
+  std::unordered_set<ImagePair> answered;     // All pairs that have been finished.
   int num_workers = 0;
+  bool last_has_put_back = false;  // The last worker met a limit of the system, and tried again.
   std::exception_ptr exception;
   std::atomic<bool> abort{false};
 
+  // Under the lock.
+  void EndWorker() {
+    --num_workers;
+    changed.notify_all();
+  }
+
+  // The end of a worker, and of the batch.
+  void Fail(std::exception_ptr with) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (!exception) exception = std::move(with);
+    abort = true;
+    EndWorker();
+  }
+
   void Push(Part part) {
     const std::lock_guard<std::mutex> lock(mutex);
+    for (const PairRows& rows : part.results) answered.insert(rows.pair);
+    for (const Failure& failure : part.failures) answered.insert(failure.first);
     finished.push_back(std::move(part));
     changed.notify_all();
   }
@@ -164,9 +184,9 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
   threads_per_process_ = std::max(1, num_threads / num_processes_);
 
   if (exact) {
-    exact_matcher_ =
-        std::make_unique<ExactMatcher>(options.exact, database.Path(), images, options.lock_timeout,
-                                       static_cast<std::size_t>(num_processes_));
+    exact_matcher_ = std::make_unique<ExactMatcher>(
+        options.exact, database.Path(), images, sqlite::LockPatience(options.lock_timeout, &stop),
+        static_cast<std::size_t>(num_processes_));
     unverified_ = database.ReadUnverifiedPairs();
     // Guided matching is COLMAP's: it matches once more where the geometry says so.
     const std::string* guided = FindOption(options.colmap_options, "guided_matching");
@@ -198,12 +218,11 @@ ColmapVerifier::ColmapVerifier(const ColmapVerifierOptions& options,
   }
 
   const std::filesystem::path output_path = work_path / "database_creator.txt";
-  const SubprocessResult result = RunSubprocess(
+  const SubprocessResult result = RunTwice(
       {colmap.executable.string(), "database_creator", "--database_path", template_path_.string()},
-      output_path, kMinTimeoutSeconds, [&stop] { return stop.Requested(); });
-  stop.ThrowIfRequested();
+      output_path, kMinTimeoutSeconds, stop);
   if (!result.Succeeded() || !std::filesystem::exists(template_path_)) {
-    ThrowIfDiskIsFull(work_path);
+    ThrowIfUnusable(work_path);
     const std::string lines = LastLines(output_path, 5);
     throw ColmapError("`" + colmap.executable.string() + " database_creator` " + result.Describe() +
                       " and made no database in " + work_path.string() + ".\n" + lines +
@@ -222,11 +241,16 @@ void ColmapVerifier::CheckThatColmapWorks(const std::vector<PairRows>& results,
     if (failing_images_.count(pair.id1) + failing_images_.count(pair.id2) > 0) continue;
     failing_images_.insert({pair.id1, pair.id2});
     if (failing_images_.size() < 2 * kMaxUnrelatedFailures) continue;
-    throw ColmapError("COLMAP fails on every pair of images. The last time it " + problem +
-                      (options_.use_gpu ? "\nThis COLMAP was built to use a GPU; on a machine "
-                                          "without one add --SiftMatching.use_gpu 0."
-                                        : "") +
-                      "\nWhat was verified before is kept.");
+    throw ColmapError(
+        (statistics_.num_verified == 0
+             ? "COLMAP fails on every pair of images. The last time it "
+             : "COLMAP has failed on " + std::to_string(kMaxUnrelatedFailures) +
+                   " pairs in a row that have no image in common. The last time it ") +
+        problem +
+        (options_.use_gpu ? "\nThis COLMAP was built to use a GPU; on a machine "
+                            "without one add --SiftMatching.use_gpu 0."
+                          : "") +
+        "\nWhat was verified before is kept.");
   }
 }
 
@@ -243,6 +267,7 @@ void ColmapVerifier::WarnOfCutFeatures(const std::vector<ImageRecord>& images) c
 
 VerifierStatistics ColmapVerifier::Statistics() const {
   VerifierStatistics statistics = statistics_;
+  statistics.num_failed = num_failed_;
   if (exact_matcher_) {
     statistics.num_matched = exact_matcher_->NumPairs();
     statistics.num_preempted = exact_matcher_->NumPreempted();
@@ -308,14 +333,14 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
   const std::filesystem::path output_path = shard.Path() / "output.txt";
   try {
     std::filesystem::copy_file(template_path_, database_path);
-    FillShard(database_path, database_.Path(), options_.lock_timeout, pairs,
+    FillShard(database_path, database_.Path(), {options_.lock_timeout, &stop_}, pairs,
               shards_with_descriptors_);
   } catch (const std::filesystem::filesystem_error& error) {
-    ThrowIfDiskIsFull(work_path_);
+    ThrowIfUnusable(work_path_);
     throw FileError("Cannot make a shard in the working directory: " + std::string(error.what()) +
                     ". Name another directory with --GraphMatching.work_path.");
   } catch (const DatabaseError&) {
-    ThrowIfDiskIsFull(work_path_);
+    ThrowIfUnusable(work_path_);
     throw;
   }
   std::ofstream list(list_path);
@@ -323,7 +348,7 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
     list << ShardImageName(pair.id1) << ' ' << ShardImageName(pair.id2) << '\n';
   }
   list.close();
-  if (!list) ThrowIfDiskIsFull(work_path_);
+  if (!list) ThrowIfUnusable(work_path_);
   if (!list) throw FileError("Cannot write " + list_path.string() + ". Is the disk full?");
 
   std::vector<std::string> command = {
@@ -339,6 +364,13 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
   if (run.ending == SubprocessResult::Ending::kStopped) return run.Describe();
 
   std::string problem;
+  if (!run.Succeeded() &&
+      LastLines(output_path, 8).find(std::strerror(EAGAIN)) != std::string::npos) {
+    throw SystemLimitError(
+        "COLMAP could not start its threads, and " + run.Describe() +
+        ". The system lets this user or container have no more processes and threads: raise that "
+        "limit (ulimit -u, Docker's --pids-limit), or use fewer with --SiftMatching.num_threads.");
+  }
   if (!run.Succeeded()) {
     problem = run.Describe() + ":\n" + LastLines(output_path, 8);
   } else {
@@ -355,7 +387,7 @@ std::string ColmapVerifier::TryShard(const std::vector<ShardPair>& pairs, Batch*
     }
   }
   if (!problem.empty()) {
-    ThrowIfDiskIsFull(work_path_);
+    ThrowIfUnusable(work_path_);
     return problem;
   }
   const std::lock_guard<std::mutex> lock(batch->mutex);
@@ -387,37 +419,91 @@ void ColmapVerifier::ProcessShard(const std::vector<ShardPair>& pairs, Batch* ba
   ProcessShard({middle, pairs.end()}, batch);
 }
 
+bool ColmapVerifier::PutBack(const std::vector<ImagePair>& shard, Batch* batch) {
+  const std::lock_guard<std::mutex> lock(batch->mutex);
+  const bool is_last = batch->num_workers == 1;
+  // The others may have left only just now.
+  if (is_last && std::exchange(batch->last_has_put_back, true)) throw;
+  // What was finished of it is not to be done again.
+  std::vector<ImagePair> left;
+  std::copy_if(shard.begin(), shard.end(), std::back_inserter(left),
+               [batch](const ImagePair& pair) { return batch->answered.count(pair) == 0; });
+  batch->shards.push_front(std::move(left));
+  if (is_last) return true;
+  batch->EndWorker();
+  num_processes_ = batch->num_workers;
+  return false;
+}
+
+bool ColmapVerifier::WorkOnNextShard(Batch* batch, std::vector<ImagePair>* shard) {
+  {
+    std::unique_lock<std::mutex> lock(batch->mutex);
+    // What is not in the database yet is lost if we are killed: it must not pile up.
+    batch->changed.wait(lock, [&] {
+      return batch->abort || batch->finished.size() <= static_cast<std::size_t>(num_processes_);
+    });
+    if (batch->shards.empty() || batch->abort || stop_.Requested()) {
+      // Under the same lock: nobody is to leave pairs to a thread that goes.
+      batch->EndWorker();
+      return false;
+    }
+    *shard = std::move(batch->shards.front());
+    batch->shards.pop_front();
+  }
+  const std::vector<ShardPair> to_verify = Match(*shard, batch);
+  const auto size = static_cast<std::size_t>(options_.max_pairs_per_shard);
+  for (std::size_t first = 0; first < to_verify.size(); first += size) {
+    if (first > 0 && stop_.Requested()) break;
+    const auto begin = to_verify.begin() + static_cast<std::ptrdiff_t>(first);
+    const std::size_t num = std::min(size, to_verify.size() - first);
+    ProcessShard({begin, begin + static_cast<std::ptrdiff_t>(num)}, batch);
+  }
+  return true;
+}
+
 void ColmapVerifier::Work(Batch* batch) {
+  std::vector<ImagePair> shard;
   try {
-    while (true) {
-      std::vector<ImagePair> shard;
-      {
-        std::unique_lock<std::mutex> lock(batch->mutex);
-        // What is not in the database yet is lost if we are killed: it must not pile up.
-        batch->changed.wait(lock, [&] {
-          return batch->abort || batch->finished.size() <= static_cast<std::size_t>(num_processes_);
-        });
-        if (batch->shards.empty() || batch->abort || stop_.Requested()) break;
-        shard = std::move(batch->shards.front());
-        batch->shards.pop_front();
-      }
-      const std::vector<ShardPair> to_verify = Match(shard, batch);
-      const auto size = static_cast<std::size_t>(options_.max_pairs_per_shard);
-      for (std::size_t first = 0; first < to_verify.size(); first += size) {
-        if (first > 0 && stop_.Requested()) break;
-        const auto begin = to_verify.begin() + static_cast<std::ptrdiff_t>(first);
-        const std::size_t num = std::min(size, to_verify.size() - first);
-        ProcessShard({begin, begin + static_cast<std::ptrdiff_t>(num)}, batch);
+    for (bool goes_on = true; goes_on;) {
+      try {
+        goes_on = WorkOnNextShard(batch, &shard);
+      } catch (const SystemLimitError&) {
+        goes_on = PutBack(shard, batch);
       }
     }
-  } catch (...) {
+  } catch (const StoppedError&) {
+    // While it waited for the database: the others finish what they have.
     const std::lock_guard<std::mutex> lock(batch->mutex);
-    if (!batch->exception) batch->exception = std::current_exception();
-    batch->abort = true;
+    batch->EndWorker();
+  } catch (...) {
+    batch->Fail(std::current_exception());
   }
-  const std::lock_guard<std::mutex> lock(batch->mutex);
-  --batch->num_workers;
-  batch->changed.notify_all();
+}
+
+std::vector<VerifiedPair> ColmapVerifier::Write(const std::vector<PairRows>& results) {
+  std::vector<VerifiedPair> written;
+  if (results.empty()) return written;
+  const std::vector<TestedPair> of_others = database_.WritePairs(results);
+  auto other = of_others.begin();
+  for (const PairRows& rows : results) {
+    VerifiedPair verified;
+    verified.pair = rows.pair;
+    std::size_t num_inliers = rows.num_inliers;
+    int config = rows.config;
+    if (other != of_others.end() && other->pair == rows.pair) {
+      num_inliers = other->num_inliers;
+      config = other->config;
+      ++other;
+    } else {
+      verified.num_matches = static_cast<std::int32_t>(rows.num_matches + rows.num_dropped_matches);
+    }
+    const bool is_edge =
+        IsEdge(num_inliers, config, static_cast<std::size_t>(options_.min_num_inliers));
+    verified.outcome = is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge;
+    verified.num_inliers = static_cast<std::uint32_t>(num_inliers);
+    written.push_back(verified);
+  }
+  return written;
 }
 
 bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
@@ -441,16 +527,29 @@ bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
   }
   if (num_unanswered == 0) return true;
 
-  batch.num_workers =
-      static_cast<int>(std::min(batch.shards.size(), static_cast<std::size_t>(num_processes_)));
-  boost::asio::thread_pool workers(static_cast<std::size_t>(batch.num_workers));
-  for (int i = batch.num_workers; i > 0; --i) {
-    boost::asio::post(workers, [this, &batch] { Work(&batch); });
-  }
+  const std::size_t num_wanted =
+      std::min(batch.shards.size(), static_cast<std::size_t>(num_processes_));
+  // They begin when it is known how many they are.
+  std::unique_lock<std::mutex> starting(batch.mutex);
+  ThreadGroup workers(num_wanted, [this, &batch] {
+    { const std::lock_guard<std::mutex> started(batch.mutex); }
+    Work(&batch);
+  });
+  // Where the system gives no thread, this one takes turns.
+  const bool works_itself = workers.Size() == 0;
+  batch.num_workers = works_itself ? 1 : static_cast<int>(workers.Size());
+  starting.unlock();
 
   try {
+    std::vector<ImagePair> own_shard;
     std::unique_lock<std::mutex> lock(batch.mutex);
     while (true) {
+      if (works_itself && batch.finished.empty() && batch.num_workers > 0) {
+        lock.unlock();
+        WorkOnNextShard(&batch, &own_shard);
+        lock.lock();
+        continue;
+      }
       batch.changed.wait(lock, [&] { return !batch.finished.empty() || batch.num_workers == 0; });
       if (batch.finished.empty()) break;
       const Batch::Part part = std::move(batch.finished.front());
@@ -458,19 +557,15 @@ bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
       batch.changed.notify_all();
       lock.unlock();
       if (part.from_colmap) CheckThatColmapWorks(part.results, part.failures);
-      if (!part.results.empty()) database_.WritePairs(part.results);
-      for (const PairRows& rows : part.results) {
-        const bool is_edge = IsEdge(rows.num_inliers, rows.config,
-                                    static_cast<std::size_t>(options_.min_num_inliers));
+      for (const VerifiedPair& verified : Write(part.results)) {
         --num_unanswered;
-        on_verified({rows.pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
-                     static_cast<std::uint32_t>(rows.num_inliers),
-                     static_cast<std::int32_t>(rows.num_matches + rows.num_dropped_matches)});
+        on_verified(verified);
       }
       for (const auto& [pair, problem] : part.failures) {
         on_warning_("COLMAP failed on the pair \"" + ImageName(pair.id1) + "\" and \"" +
                     ImageName(pair.id2) + "\", which stays untested. It " + problem);
         --num_unanswered;
+        ++num_failed_;
         on_verified({pair, PairOutcome::kFailed, 0});
       }
       lock.lock();
@@ -481,10 +576,14 @@ bool ColmapVerifier::Verify(const std::vector<ImagePair>& pairs,
       batch.abort = true;
       batch.changed.notify_all();
     }
-    workers.join();
-    throw;
+    workers.Join();
+    try {
+      throw;
+    } catch (const StoppedError&) {
+      return false;  // While it waited for the database: what could not be written is given up.
+    }
   }
-  workers.join();
+  workers.Join();
   if (batch.exception) std::rethrow_exception(batch.exception);
   return num_unanswered == 0;
 }

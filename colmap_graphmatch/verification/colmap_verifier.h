@@ -72,7 +72,8 @@ struct VerifierStatistics {
   std::size_t num_matched = 0;    // Pairs whose descriptors were matched here,
   std::size_t num_preempted = 0;  // those of them given up after the features of largest scale,
   std::size_t num_unmatched = 0;  // and those with fewer matches than an edge needs inliers.
-  std::size_t num_verified = 0;   // Pairs that COLMAP verified.
+  std::size_t num_verified = 0;   // Pairs that COLMAP verified,
+  std::size_t num_failed = 0;     // and those on which it failed.
   std::size_t num_image_reads = 0;
 };
 
@@ -84,7 +85,9 @@ struct VerifierStatistics {
 // A shard on which COLMAP crashes, hangs or writes nonsense is tried again, then halved until the
 // pair that is to blame is alone; that one is reported as kFailed and through on_warning, and stays
 // untested in the database. If COLMAP fails on several pairs in a row that have no image in common,
-// Verify throws ColmapError with COLMAP's last words.
+// Verify throws ColmapError with COLMAP's last words. Where the system allows fewer threads or
+// processes than are asked for, it works with those that it gets; with no process at all, Verify
+// throws SystemLimitError.
 class ColmapVerifier : public PairVerifier {
  public:
   // images: those of the database. work_path: an existing directory for the shards. stop and
@@ -115,12 +118,20 @@ class ColmapVerifier : public PairVerifier {
   std::string ImageName(ImageId image_id) const { return images_.at(image_id).name; }
   // What a worker thread does: takes shards until none is left.
   void Work(Batch* batch);
+  // False if there is none, and the worker ends.
+  bool WorkOnNextShard(Batch* batch, std::vector<ImagePair>* shard);
+  // While a SystemLimitError is handled: puts back what is left of a worker's shard, and has the
+  // worker end, since with one less there may be room for the others. True if it was the last one
+  // and is to go on; rethrows the error if it has done so before.
+  bool PutBack(const std::vector<ImagePair>& shard, Batch* batch);
   // Matches the pairs here. Those with too few matches are done; returns the others.
   std::vector<ShardPair> Match(const std::vector<ImagePair>& pairs, Batch* batch);
   void ProcessShard(const std::vector<ShardPair>& pairs, Batch* batch);
   // One run of COLMAP on the pairs. An empty string if it went well; otherwise what went wrong.
   std::string TryShard(const std::vector<ShardPair>& pairs, Batch* batch,
                        std::vector<PairRows>* results);
+  // Writes results to the database and returns what it has of these pairs from then on.
+  std::vector<VerifiedPair> Write(const std::vector<PairRows>& results);
   void WarnOfCutFeatures(const std::vector<ImageRecord>& images) const;
   // Throws ColmapError once COLMAP has failed on pairs that have nothing in common.
   void CheckThatColmapWorks(const std::vector<PairRows>& results,
@@ -134,7 +145,7 @@ class ColmapVerifier : public PairVerifier {
   std::filesystem::path template_path_;  // An empty database, made by the installed COLMAP.
   const StopRequest& stop_;
   std::function<void(const std::string&)> on_warning_;
-  int num_processes_ = 1;
+  int num_processes_ = 1;  // Guarded by the mutex of the batch once it may become less.
   int threads_per_process_ = 1;
   std::vector<std::string> arguments_;           // Of every run of matches_importer.
   std::vector<VerifiedPair> known_;              // Ascending.
@@ -142,6 +153,8 @@ class ColmapVerifier : public PairVerifier {
   std::vector<ImagePair> unverified_;  // Ascending; their matches are in the database already.
   bool shards_with_descriptors_ = true;
   int unmatched_config_ = 0;  // What COLMAP stores for pairs with too few matches.
+
+  std::size_t num_failed_ = 0;
 
   // Guarded by the mutex of the batch.
   double slowest_seconds_per_pair_ = 0;  // 0 until a shard came back.

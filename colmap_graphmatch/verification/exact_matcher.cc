@@ -58,14 +58,14 @@ void ExactMatcherOptions::Check() const {
 
 ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
                            const std::filesystem::path& database_path,
-                           const std::vector<ImageRecord>& images, double lock_timeout_seconds,
-                           std::size_t num_threads)
+                           const std::vector<ImageRecord>& images,
+                           const sqlite::LockPatience& patience, std::size_t num_threads)
     : options_(options),
       images_(ById(images)),
       cache_(CacheBytes(options.cache_gb), NumReaders(num_threads),
-             [this, database_path, lock_timeout_seconds]() -> DescriptorCache::Reader {
-               const auto database = std::make_shared<Database>(
-                   database_path, sqlite::Access::kRead, lock_timeout_seconds);
+             [this, database_path, patience]() -> DescriptorCache::Reader {
+               const auto database =
+                   std::make_shared<Database>(database_path, sqlite::Access::kRead, patience);
                return
                    [this, database](ImageId image) { return ReadFeatures(database.get(), image); };
              }) {}

@@ -38,7 +38,7 @@ class ExactMatcher {
   // images: those of the database. num_threads: how many will call Match at a time. Nothing is read
   // yet.
   ExactMatcher(const ExactMatcherOptions& options, const std::filesystem::path& database_path,
-               const std::vector<ImageRecord>& images, double lock_timeout_seconds,
+               const std::vector<ImageRecord>& images, const sqlite::LockPatience& patience,
                std::size_t num_threads);
 
   // The matches of every pair, on the calling thread alone, while the images of the pairs that come

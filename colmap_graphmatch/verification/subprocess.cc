@@ -1,11 +1,13 @@
 #include "colmap_graphmatch/verification/subprocess.h"
 
+#include <fcntl.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <boost/process.hpp>
 #include <boost/process/extend.hpp>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstring>
@@ -14,6 +16,7 @@
 #include <thread>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/stopwatch.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -22,6 +25,48 @@ namespace bp = boost::process;
 
 // Between two looks at the program. Short against the start-up of COLMAP (25 ms).
 constexpr std::chrono::milliseconds kPollInterval(4);
+
+// How long a process is waited for that the system does not allow, and how long between two tries.
+constexpr double kSecondsForProcess = 3;
+constexpr std::chrono::milliseconds kRetryInterval(50);
+
+bool IsLimit(const std::error_code& error) {
+  return error == std::errc::resource_unavailable_try_again ||
+         error == std::errc::not_enough_memory;
+}
+
+// Boost.Process does not say which file it could not open.
+void CheckCanStart(const std::filesystem::path& output_path) {
+  // Written anew: Boost does not cut off what a file contains.
+  std::error_code ignored;
+  std::filesystem::remove(output_path, ignored);
+  struct OpenFiles {
+    std::vector<int> numbers;
+    ~OpenFiles() {
+      for (const int number : numbers) ::close(number);
+    }
+  } files;
+  const auto open = [&files](const std::filesystem::path& path, int flags,
+                             const std::string& advice) {
+    const int number = ::open(path.c_str(), flags | O_CLOEXEC, 0600);
+    const int error = errno;
+    if (number >= 0) {
+      files.numbers.push_back(number);
+    } else if (error == EMFILE || error == ENFILE) {
+      throw SystemLimitError(std::string("Cannot start COLMAP: ") + std::strerror(error) +
+                             ". Let the program open more files (ulimit -n), or use fewer threads "
+                             "with --SiftMatching.num_threads.");
+    } else {
+      throw FileError("Cannot open " + path.string() + ": " + std::strerror(error) + ". " + advice);
+    }
+  };
+  open(output_path, O_WRONLY | O_CREAT,
+       "It is in the working directory: name another one with --GraphMatching.work_path.");
+  // As many as Boost has open at a time: a pipe of its own, and one for each stream.
+  for (int i = 0; i < 4; ++i) {
+    open("/dev/null", O_RDWR, "COLMAP needs it: mount /dev, also in a container or a chroot.");
+  }
+}
 
 std::string Rounded(double seconds) {
   std::string text = std::to_string(seconds);
@@ -48,30 +93,49 @@ std::string SubprocessResult::Describe() const {
 SubprocessResult RunSubprocess(const std::vector<std::string>& command,
                                const std::filesystem::path& output_path, double timeout_seconds,
                                const std::function<bool()>& should_stop) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto elapsed = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  };
+  bp::environment environment = boost::this_process::environment();
+  for (const char* variable : {"TMPDIR", "GLOG_log_dir"}) {
+    environment[variable] = output_path.parent_path().string();
+  }
+  Stopwatch elapsed;
   // Until exec, a child holds what others have just opened and not yet marked to be closed: one at
   // a time.
   static std::mutex starting;
   std::unique_lock<std::mutex> lock(starting);
+  CheckCanStart(output_path);
   const pid_t parent = ::getpid();
   bp::group group;
   std::error_code error;
-  // Boost opens it for writing without cutting off what it contains.
-  std::error_code ignored;
-  std::filesystem::remove(output_path, ignored);
-  bp::child child(
-      bp::exe = command.front(),
-      bp::args = std::vector<std::string>(command.begin() + 1, command.end()),
-      bp::std_in<bp::null, (bp::std_out & bp::std_err)> output_path.string(), group, error,
-      bp::extend::on_exec_setup = [parent](auto&) {
-        ::signal(SIGPIPE, SIG_DFL);
-        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (::getppid() != parent) ::_exit(1);
-      });
+  const auto start = [&] {
+    return bp::child(
+        bp::exe = command.front(),
+        bp::args = std::vector<std::string>(command.begin() + 1, command.end()), environment,
+        bp::std_in<bp::null, (bp::std_out & bp::std_err)> output_path.string(), group, error,
+        bp::extend::on_exec_setup = [parent](auto&) {
+          // What is ignored here would be ignored there.
+          for (const int signal : {SIGPIPE, SIGXFSZ}) ::signal(signal, SIG_DFL);
+          ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+          if (::getppid() != parent) ::_exit(1);
+        });
+  };
+  bp::child child = start();
+  // Others may end.
+  while (IsLimit(error) && elapsed.Seconds() < kSecondsForProcess && !should_stop()) {
+    lock.unlock();
+    std::this_thread::sleep_for(kRetryInterval);
+    lock.lock();
+    error.clear();
+    group = bp::group();
+    child = start();
+  }
   lock.unlock();
+  if (IsLimit(error)) {
+    throw SystemLimitError("Cannot start " + command.front() + ": " + error.message() +
+                           ". The system lets this user or container have no more processes and "
+                           "threads: raise that limit (ulimit -u, Docker's --pids-limit), or use "
+                           "fewer with --SiftMatching.num_threads.");
+  }
+  elapsed = Stopwatch();
   if (error) {
     throw ColmapError("Cannot start " + command.front() + ": " + error.message() +
                       ". If it is not a program that runs on this machine, name another with "
@@ -84,7 +148,7 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
     if (should_stop()) {
       result.ending = SubprocessResult::Ending::kStopped;
       killed = true;
-    } else if (timeout_seconds > 0 && elapsed() > timeout_seconds) {
+    } else if (timeout_seconds > 0 && elapsed.Seconds() > timeout_seconds) {
       result.ending = SubprocessResult::Ending::kTimedOut;
       killed = true;
     }
@@ -95,7 +159,7 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
     }
     std::this_thread::sleep_for(kPollInterval);
   }
-  result.seconds = elapsed();
+  result.seconds = elapsed.Seconds();
   if (killed) return result;
 
   const int status = child.native_exit_code();
@@ -104,6 +168,18 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
     result.signal = WTERMSIG(status);
   } else {
     result.exit_code = WEXITSTATUS(status);
+  }
+  return result;
+}
+
+SubprocessResult RunTwice(const std::vector<std::string>& command,
+                          const std::filesystem::path& output_path, double timeout_seconds,
+                          const StopRequest& stop) {
+  SubprocessResult result;
+  for (int i = 0; i < 2; ++i) {
+    result = RunSubprocess(command, output_path, timeout_seconds, [&] { return stop.Requested(); });
+    stop.ThrowIfRequested();
+    if (result.ending != SubprocessResult::Ending::kSignal) break;
   }
   return result;
 }

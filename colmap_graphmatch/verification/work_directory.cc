@@ -13,11 +13,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <random>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/random_name.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -49,15 +50,6 @@ constexpr std::uintmax_t kMinFreeBytes = std::uintmax_t{16} << 20;
   ::nanosleep(&pause, nullptr);
   ::execl("/bin/rm", "rm", "-rf", "--", path, static_cast<char*>(nullptr));
   ::_exit(1);
-}
-
-// Names that nobody can guess: mkdir says if one is taken all the same.
-std::string RandomName() {
-  static constexpr char kDigits[] = "0123456789abcdefghijklmnopqrstuv";
-  std::random_device device;
-  std::string name;
-  for (int i = 0; i < 16; ++i) name += kDigits[device() % 32];
-  return name;
 }
 
 }  // namespace
@@ -96,9 +88,25 @@ void WorkDirectory::StartGuard() {
 }
 
 WorkDirectory::~WorkDirectory() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
+  std::error_code error;
+  std::filesystem::remove_all(path_, error);
+  if (error) RemoveByAnotherProcess();
   DismissGuard();
+}
+
+// For want of file descriptors, which that process has.
+void WorkDirectory::RemoveByAnotherProcess() {
+  if (guard_socket_ >= 0) {
+    ::close(std::exchange(guard_socket_, -1));
+    ::waitpid(guard_, nullptr, 0);
+    return;
+  }
+  const pid_t remover = ::fork();
+  if (remover == 0) {
+    ::execl("/bin/rm", "rm", "-rf", "--", path_.c_str(), static_cast<char*>(nullptr));
+    ::_exit(1);
+  }
+  if (remover > 0) ::waitpid(remover, nullptr, 0);
 }
 
 void WorkDirectory::DismissGuard() {
@@ -110,8 +118,24 @@ void WorkDirectory::DismissGuard() {
   if (guard_ > 0) ::waitpid(guard_, nullptr, 0);
 }
 
-void ThrowIfDiskIsFull(const std::filesystem::path& work_path) {
+void ThrowIfUnusable(const std::filesystem::path& work_path) {
   std::error_code error;
+  if (!std::filesystem::is_directory(work_path, error)) {
+    throw FileError("The working directory " + work_path.string() +
+                    " is gone: another program, perhaps one that cleans up, has removed it during "
+                    "the run. Name another directory with --GraphMatching.work_path, and run the "
+                    "same command again to go on.");
+  }
+  const std::filesystem::path probe = work_path / "probe";
+  const int number = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  if (number < 0 && errno != EMFILE && errno != ENFILE && errno != ENOSPC) {
+    throw FileError("Cannot write to the working directory " + work_path.string() + ": " +
+                    std::strerror(errno) +
+                    ". Name another one with --GraphMatching.work_path; run the same command again "
+                    "to go on.");
+  }
+  if (number >= 0) ::close(number);
+  std::filesystem::remove(probe, error);
   const std::filesystem::space_info space = std::filesystem::space(work_path, error);
   if (error || space.available >= kMinFreeBytes) return;
   throw FileError("The disk of the working directory " + work_path.string() +

@@ -25,14 +25,15 @@ class WorkDirectory {
  private:
   void StartGuard();
   void DismissGuard();
+  void RemoveByAnotherProcess();
 
   std::filesystem::path path_;
   int guard_socket_ = -1;  // The guard acts when this end is closed without a word.
   pid_t guard_ = -1;
 };
 
-// Throws FileError if the disk of a working directory is full, or all but full: whatever has failed
-// in it, or seems to have succeeded, cannot be trusted then.
-void ThrowIfDiskIsFull(const std::filesystem::path& work_path);
+// Throws FileError if a working directory is gone or cannot be written to, or if its disk is full,
+// or all but full: whatever has failed in it, or seems to have succeeded, cannot be trusted then.
+void ThrowIfUnusable(const std::filesystem::path& work_path);
 
 }  // namespace colmap_graphmatch

@@ -198,6 +198,22 @@ printf '\xff' | dd of="$database" bs=1 seek=$(((page - 1) * 4096)) conv=notrunc 
 piece='database disk image is malformed. The file is damaged: `sqlite3 FILE .recover` may save its contents.' \
   says 2 'The file is damaged inside' 'take a copy of before, or try `.recover`' "${run[@]}"
 fresh
+"${run[@]}" --GraphMatching.max_pairs 40 >"$work/output.txt" 2>&1
+change 'PRAGMA journal_mode = DELETE'
+# Where the rows of a page begin, as its header says, is behind them.
+page=$(sqlite3 "$database" "SELECT rootpage FROM sqlite_schema WHERE name = 'matches'")
+while [[ $(dd if="$database" bs=1 skip=$(((page - 1) * 4096)) count=1 status=none | od -An -tu1) -ne 13 ]]; do
+  page=$((page + 1))
+done
+printf '\x0f\xf0' | dd of="$database" bs=1 seek=$(((page - 1) * 4096 + 5)) conv=notrunc status=none
+piece='and to write to it could destroy more. Nothing was written: `sqlite3 FILE .recover` may save its contents.' \
+  says 2 'A table to write to is damaged in a way that reading does not notice' \
+  'take a copy of before, or try `.recover`' "${run[@]}"
+fresh
+rm "$database"
+mkfifo "$database"
+says 2 'It is a pipe, or another file that is none' "$same" "${run[@]}"
+fresh
 change 'DELETE FROM images; DELETE FROM keypoints; DELETE FROM descriptors'
 says 2 'It has no images' 'extract features into it' "${run[@]}"
 fresh
@@ -584,6 +600,10 @@ fresh
 FAKE_COLMAP_FAULT=exit FAKE_COLMAP_FAULT_PAIR='1 2' says 0 'It fails on one pair' \
   'nothing to do: the next run tries it again' "${run[@]}"
 fresh
+change 'PRAGMA foreign_keys = ON; DELETE FROM images WHERE image_id > 4; DELETE FROM descriptors WHERE image_id > 4'
+piece='COLMAP failed on all' FAKE_COLMAP_FAULT=exit FAKE_COLMAP_FAULT_PAIR=all \
+  says 4 'It fails on every pair, of however few' "$kept" "${run[@]}"
+fresh
 FAKE_COLMAP_FAULT=crash FAKE_COLMAP_FAULT_PAIR='1 2' FAKE_COLMAP_FAULT_TIMES=1 FAKE_COLMAP_LOG=$work/faults \
   works 'It is killed once in the middle'
 grep -q -x fault "$work/faults" || fail 'it was not killed'
@@ -663,7 +683,7 @@ says 5 'The file of vectors is no NumPy array' "$given" "${run[@]}" "${vectors[@
 piece='belong together' says 1 'Vectors of a file are asked for, and no file is given' "$mend" "${run[@]}" \
   --GraphMatching.descriptor file
 piece='give --image_path' says 1 'GIST without the photos' "$mend" "${run[@]}" --GraphMatching.descriptor gist
-piece='there is no such file' says 5 'A photo is missing, for GIST' 'name the directory of the photos' "${run[@]}" \
+piece='No such file or directory. Is --image_path' says 5 'A photo is missing, for GIST' 'name the directory of the photos' "${run[@]}" \
   --GraphMatching.descriptor gist --image_path "$work"
 says 5 'The log of tests cannot be written' 'name another file' "${run[@]}" --GraphMatching.test_log "$work/none/log.csv"
 partial=yes says 5 'The report cannot be written' 'name another file' "${run[@]}" \
@@ -672,6 +692,17 @@ says 5 'The list of edges cannot be written' 'name another file' "${run[@]}" \
   --GraphMatching.export_pairs "$work/none/pairs.txt"
 says 5 'The graph cannot be written' 'name another file' "${run[@]}" --GraphMatching.export_graph "$work/none/graph.dot"
 says 5 'The log cannot be written' 'name another file' "${run[@]}" --log_path "$work/none/log.txt"
+says 5 'A list is a device' "$names" "${run[@]}" --GraphMatching.match_list_path /dev/zero
+cp "$database" "$place/other.db"
+says 5 'A file to write is another database' 'name another file' "${run[@]}" \
+  --GraphMatching.export_pairs "$place/other.db"
+rm "$place/other.db"
+echo 'my own names' >"$place/vectors.txt"
+says 5 'What is written beside a file would take the place of one of yours' 'move it, or name another file' "${run[@]}" \
+  --GraphMatching.export_vectors "$place/vectors.npy"
+rm "$place/vectors.txt"
+says 1 'A file to write belongs to the database' 'name another file' "${run[@]}" \
+  --GraphMatching.export_pairs "$database-wal"
 says 1 'A file to write is the database' 'name another file' "${run[@]}" --GraphMatching.export_pairs "$database"
 says 1 'The log is the database' 'name another file' "${run[@]}" --log_path "$database"
 says 1 'Two files to write are one' 'name another file' "${run[@]}" --GraphMatching.report "$place/run.html" \
@@ -689,6 +720,8 @@ works_with 'All three of the standard streams are closed' '"$@" >&- 2>&- <&-'
 works_with 'Standard output is closed' '"$@" >&-'
 works_with 'Standard output goes to a full disk' '"$@" >/dev/full'
 works_with 'Both go to a full disk' '"$@" >/dev/full 2>&1'
+fresh
+says 0 'The log goes to a full disk' "$nothing" "${run[@]}" --log_path /dev/full
 works_with 'Nobody reads the output (a pipe to a program that ends)' '"$@" 2>&1 | true; exit "${PIPESTATUS[0]}"'
 says 0 'The help goes to a full disk' "$nothing" bash -c '"$@" >/dev/full' bash "$matcher" -h
 

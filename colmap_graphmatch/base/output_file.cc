@@ -1,0 +1,286 @@
+#include "colmap_graphmatch/base/output_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <streambuf>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/input_file.h"
+#include "colmap_graphmatch/base/random_name.h"
+
+namespace colmap_graphmatch {
+
+namespace {
+
+[[noreturn]] void Fail(const std::filesystem::path& path, const std::string& reason) {
+  throw FileError("Cannot write " + path.string() + ": " + reason + ".");
+}
+
+[[noreturn]] void FailWith(const std::filesystem::path& path, int error) {
+  Fail(path, std::strerror(error));
+}
+
+// Gives a file the rights of the one whose place it takes: who may not read that may not read this.
+void TakeAfter(const struct stat& status, int number) {
+  // Root alone may give a file away.
+  if (::fchown(number, status.st_uid, status.st_gid) != 0) errno = 0;
+  ::fchmod(number, status.st_mode & 0777U);
+}
+
+// Closes a file descriptor at the end of its scope.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int Number() const { return number_; }
+  // False if what was written could not be kept.
+  bool Close() { return ::close(std::exchange(number_, -1)) == 0; }
+
+ private:
+  int number_;
+};
+
+// Where the output goes.
+struct Target {
+  std::filesystem::path path;  // Not a link.
+  bool is_new = true;
+  bool is_replaced = true;  // Else it is written to.
+  struct stat status = {};  // Of what is there.
+};
+
+bool IsOfTheSystem(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const std::filesystem::path directory =
+      std::filesystem::weakly_canonical(std::filesystem::absolute(path).parent_path(), ignored);
+  const auto first = directory.begin() == directory.end() ? directory.end() : ++directory.begin();
+  return directory == "/dev" || (first != directory.end() && *first == "proc");
+}
+
+Target FindTarget(const std::filesystem::path& path) {
+  // As many links as Linux follows.
+  constexpr int kMaxNumLinks = 40;
+  Target target;
+  target.path = path;
+  for (int i = 0; i <= kMaxNumLinks; ++i) {
+    struct stat status = {};
+    // A link in /dev or /proc leads to what this process has open: to be written to, whatever it
+    // is.
+    const bool is_of_the_system = IsOfTheSystem(target.path);
+    const int result = is_of_the_system ? ::stat(target.path.c_str(), &status)
+                                        : ::lstat(target.path.c_str(), &status);
+    if (result != 0) {
+      if (errno != ENOENT) FailWith(path, errno);
+      return target;
+    }
+    if (!S_ISLNK(status.st_mode)) {
+      if (S_ISDIR(status.st_mode)) FailWith(path, EISDIR);
+      target.is_new = false;
+      target.is_replaced = S_ISREG(status.st_mode) && !is_of_the_system;
+      target.status = status;
+      return target;
+    }
+    std::error_code error;
+    const std::filesystem::path next = std::filesystem::read_symlink(target.path, error);
+    if (error) Fail(path, error.message());
+    target.path = target.path.parent_path() / next;  // An absolute one takes its place.
+  }
+  FailWith(path, ELOOP);
+}
+
+void ProtectDatabases(const std::filesystem::path& path, const Target& target) {
+  if (target.is_replaced && !target.is_new && IsSqliteFile(target.path)) {
+    Fail(path, "it is a SQLite database. Name another file, or delete this one first");
+  }
+  for (const char* suffix : {"-wal", "-shm", "-journal"}) {
+    const std::string name = target.path.string();
+    const std::size_t size = std::strlen(suffix);
+    if (name.size() <= size || name.compare(name.size() - size, size, suffix) != 0) continue;
+    const std::string database = name.substr(0, name.size() - size);
+    if (!IsSqliteFile(database)) continue;
+    Fail(path,
+         "SQLite keeps there what belongs to the database " + database + ". Name another file");
+  }
+}
+
+// Opens what is not replaced.
+int OpenInPlace(const std::filesystem::path& path, const Target& target, int flags) {
+  // Without a reader a pipe would be waited for.
+  const int number = ::open(target.path.c_str(),
+                            O_WRONLY | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK | flags, 0666);
+  if (number < 0 && errno == ENXIO && S_ISFIFO(target.status.st_mode)) {
+    Fail(path, "no program reads from this pipe. Start the reader first");
+  }
+  if (number < 0) FailWith(path, errno);
+  ::fcntl(number, F_SETFL, ::fcntl(number, F_GETFL) & ~O_NONBLOCK);
+  return number;
+}
+
+struct NewFile {
+  int number = -1;
+  std::filesystem::path path;
+};
+
+// Makes a file that is to take the place of the target.
+NewFile MakeBeside(const std::filesystem::path& path, const Target& target) {
+  NewFile file;
+  file.path = std::filesystem::absolute(target.path).parent_path() /
+              (".graphmatch-" + RandomName() + ".partial");
+  file.number =
+      ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (file.number < 0) FailWith(path, errno);
+  return file;
+}
+
+}  // namespace
+
+// What is written to an open file.
+class DescriptorBuffer : public std::streambuf {
+ public:
+  explicit DescriptorBuffer(int number) : file_(number) { Clear(); }
+  ~DescriptorBuffer() override { Flush(); }
+  DescriptorBuffer(const DescriptorBuffer&) = delete;
+  DescriptorBuffer& operator=(const DescriptorBuffer&) = delete;
+
+  int Error() const { return error_; }
+
+  // Returns the errno of what failed, or 0.
+  int Close(bool to_disk) {
+    Flush();
+    if (error_ == 0 && to_disk && ::fsync(file_.Number()) != 0) error_ = errno;
+    if (!file_.Close() && error_ == 0) error_ = errno;
+    return error_;
+  }
+
+ protected:
+  int_type overflow(int_type letter) override {
+    Flush();
+    if (error_ != 0) return traits_type::eof();
+    if (!traits_type::eq_int_type(letter, traits_type::eof())) {
+      *pptr() = traits_type::to_char_type(letter);
+      pbump(1);
+    }
+    return traits_type::not_eof(letter);
+  }
+
+  int sync() override {
+    Flush();
+    return error_ == 0 ? 0 : -1;
+  }
+
+ private:
+  void Clear() { setp(bytes_.data(), bytes_.data() + bytes_.size()); }
+
+  void Flush() {
+    const char* data = pbase();
+    while (data < pptr() && error_ == 0) {
+      const ssize_t size = ::write(file_.Number(), data, static_cast<std::size_t>(pptr() - data));
+      if (size >= 0) {
+        data += size;
+      } else if (errno != EINTR) {
+        error_ = errno;
+      }
+    }
+    Clear();
+  }
+
+  Descriptor file_;
+  int error_ = 0;  // Of the first write that failed.
+  std::array<char, 65536> bytes_ = {};
+};
+
+namespace {
+
+int OpenToGrow(const std::filesystem::path& path, GrowingFile::Mode mode) {
+  const Target target = FindTarget(path);
+  ProtectDatabases(path, target);
+  const bool is_emptied = mode == GrowingFile::Mode::kAnew && target.is_replaced;
+  return OpenInPlace(path, target, is_emptied ? O_TRUNC : O_APPEND);
+}
+
+// Calls write with a stream to the open file. Returns the errno of what failed, or 0.
+int WriteAndClose(int number, bool to_disk, const std::function<void(std::ostream&)>& write) {
+  DescriptorBuffer buffer(number);
+  std::ostream stream(&buffer);
+  write(stream);
+  return buffer.Close(to_disk);
+}
+
+// Removes a file at the end of its scope, unless it has got its name by then.
+class Temporary {
+ public:
+  explicit Temporary(std::filesystem::path path) : path_(std::move(path)) {}
+  ~Temporary() {
+    std::error_code ignored;
+    if (!path_.empty()) std::filesystem::remove(path_, ignored);
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+
+  // Returns the errno of what failed, or 0.
+  int Rename(const std::filesystem::path& name) {
+    if (::rename(path_.c_str(), name.c_str()) != 0) return errno;
+    // The name is on the disk when the directory is. Not every file system can say so.
+    const Descriptor directory(
+        ::open(name.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (directory.Number() >= 0) ::fsync(directory.Number());
+    path_.clear();
+    return 0;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace
+
+GrowingFile::GrowingFile(const std::filesystem::path& path, Mode mode)
+    : std::ostream(nullptr), buffer_(std::make_unique<DescriptorBuffer>(OpenToGrow(path, mode))) {
+  rdbuf(buffer_.get());
+}
+
+GrowingFile::~GrowingFile() { rdbuf(nullptr); }
+
+int GrowingFile::Error() const { return buffer_->Error(); }
+
+void WriteWholeFile(const std::filesystem::path& path,
+                    const std::function<void(std::ostream&)>& write) {
+  const Target target = FindTarget(path);
+  ProtectDatabases(path, target);
+  if (!target.is_replaced) {
+    const int error = WriteAndClose(OpenInPlace(path, target, O_APPEND), false, write);
+    if (error != 0) FailWith(path, error);
+    return;
+  }
+  const NewFile file = MakeBeside(path, target);
+  Temporary temporary(file.path);
+  if (!target.is_new) TakeAfter(target.status, file.number);
+  int error = WriteAndClose(file.number, true, write);
+  if (error == 0) error = temporary.Rename(std::filesystem::absolute(target.path));
+  if (error != 0) FailWith(path, error);
+}
+
+void CheckCanWrite(const std::filesystem::path& path) {
+  const Target target = FindTarget(path);
+  ProtectDatabases(path, target);
+  if (!target.is_new && ::access(target.path.c_str(), W_OK) != 0) FailWith(path, errno);
+  // A pipe is not opened: its reader would take the end of this check for the end of the file.
+  if (!target.is_replaced) return;
+  const NewFile file = MakeBeside(path, target);
+  const Temporary temporary(file.path);
+  ::close(file.number);
+}
+
+}  // namespace colmap_graphmatch
