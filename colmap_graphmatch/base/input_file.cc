@@ -10,6 +10,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "colmap_graphmatch/base/file_descriptor.h"
+
 namespace colmap_graphmatch {
 namespace {
 
@@ -63,12 +65,9 @@ std::ifstream OpenRegularFile(const std::filesystem::path& path) {
 }
 
 std::string ReadText(const std::filesystem::path& path, const StopRequest* stop) {
-  const int number = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
+  const int number = file.Number();
   if (number < 0) throw UnreadableFileError(path, std::strerror(errno));
-  struct Closer {
-    int number;
-    ~Closer() { ::close(number); }
-  } const closer = {number};
   struct stat status = {};
   if (::fstat(number, &status) != 0) throw UnreadableFileError(path, std::strerror(errno));
   if (S_ISFIFO(status.st_mode)) return ReadPipe(path, number, stop);

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/file_descriptor.h"
 #include "colmap_graphmatch/base/input_file.h"
 #include "colmap_graphmatch/base/random_name.h"
 
@@ -34,24 +35,6 @@ void TakeAfter(const struct stat& status, int number) {
   if (::fchown(number, status.st_uid, status.st_gid) != 0) errno = 0;
   ::fchmod(number, status.st_mode & 0777U);
 }
-
-// Closes a file descriptor at the end of its scope.
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int Number() const { return number_; }
-  // False if what was written could not be kept.
-  bool Close() { return ::close(std::exchange(number_, -1)) == 0; }
-
- private:
-  int number_;
-};
 
 // Where the output goes.
 struct Target {
@@ -196,7 +179,7 @@ class DescriptorBuffer : public std::streambuf {
     Clear();
   }
 
-  Descriptor file_;
+  FileDescriptor file_;
   int error_ = 0;  // Of the first write that failed.
   std::array<char, 65536> bytes_ = {};
 };
@@ -233,7 +216,7 @@ class Temporary {
   int Rename(const std::filesystem::path& name) {
     if (::rename(path_.c_str(), name.c_str()) != 0) return errno;
     // The name is on the disk when the directory is. Not every file system can say so.
-    const Descriptor directory(
+    const FileDescriptor directory(
         ::open(name.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (directory.Number() >= 0) ::fsync(directory.Number());
     path_.clear();

@@ -43,6 +43,8 @@ struct ThreadPool::Workers {
     Start(num_started / 2);
   }
   ~Workers() { context.stop(); }
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
 
   void Start(std::size_t num_threads) {
     threads = std::make_unique<ThreadGroup>(num_threads, [this] { context.run(); });

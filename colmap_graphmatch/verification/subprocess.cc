@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/file_descriptor.h"
 #include "colmap_graphmatch/base/stopwatch.h"
 
 namespace colmap_graphmatch {
@@ -40,25 +41,18 @@ void CheckCanStart(const std::filesystem::path& output_path) {
   // Written anew: Boost does not cut off what a file contains.
   std::error_code ignored;
   std::filesystem::remove(output_path, ignored);
-  struct OpenFiles {
-    std::vector<int> numbers;
-    ~OpenFiles() {
-      for (const int number : numbers) ::close(number);
-    }
-  } files;
+  std::vector<FileDescriptor> files;
   const auto open = [&files](const std::filesystem::path& path, int flags,
                              const std::string& advice) {
-    const int number = ::open(path.c_str(), flags | O_CLOEXEC, 0600);
+    files.emplace_back(::open(path.c_str(), flags | O_CLOEXEC, 0600));
     const int error = errno;
-    if (number >= 0) {
-      files.numbers.push_back(number);
-    } else if (error == EMFILE || error == ENFILE) {
+    if (files.back().Number() >= 0) return;
+    if (error == EMFILE || error == ENFILE) {
       throw SystemLimitError(std::string("Cannot start COLMAP: ") + std::strerror(error) +
                              ". Let the program open more files (ulimit -n), or use fewer threads "
                              "with --SiftMatching.num_threads.");
-    } else {
-      throw FileError("Cannot open " + path.string() + ": " + std::strerror(error) + ". " + advice);
     }
+    throw FileError("Cannot open " + path.string() + ": " + std::strerror(error) + ". " + advice);
   };
   open(output_path, O_WRONLY | O_CREAT,
        "It is in the working directory: name another one with --GraphMatching.work_path.");

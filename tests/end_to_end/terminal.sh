@@ -48,8 +48,8 @@ done
 echo "== A terminal that is too narrow for a field"
 for columns in 30 46; do
   FAKE_COLMAP_DELAY_MS=2 on_terminal 0 "$columns" "narrow$columns"
-  # The lines of the log are wrapped; none is overwritten.
-  tr -d '\n' <"$work/narrow$columns.final" | grep -q 'Learnt a mixture of .*Described 40 images by' ||
+  # The lines of the log are wrapped, somewhere, since numbers of processes differ in length; none is overwritten.
+  tr -d ' \n' <"$work/narrow$columns.final" | grep -q 'Learntamixtureof.*Described40imagesby' ||
     { cat "$work/narrow$columns.final"; fail "the block is in the log"; }
   expect_count 0 'images alone' "$work/narrow$columns.final"
 done
@@ -131,5 +131,5 @@ expect_count 2 'Learnt a mixture' "$work/logs/graphmatch_matcher.log"
 expect_exit 2 'There is no database' "$matcher" --database_path "$work/none.db" --log_target file \
   --log_path "$work/logs/errors.log"
 expect_count 1 '^E.*There is no database' "$work/logs/errors.log"
-expect_exit 5 'Cannot write the log /nowhere/a.log: No such file or directory' \
+expect_exit 5 'Cannot write /nowhere/a.log: No such file or directory' \
   "$matcher" --database_path "$work/logged.db" --log_path /nowhere/a.log
