@@ -188,9 +188,9 @@ TEST(Options, SeedsReachColmapToo) {
 
 TEST(Options, LightGlueIsColmaps) {
   EXPECT_EQ(Parse({"--FeatureMatching.type", "SIFT_BRUTEFORCE"}).pipeline.verification.matcher,
-            ColmapVerifierOptions::Matcher::kAuto);
+            VerificationOptions::Matcher::kAuto);
   const CommandLine line = Parse({"--FeatureMatching.type", "SIFT_LIGHTGLUE"});
-  EXPECT_EQ(line.pipeline.verification.matcher, ColmapVerifierOptions::Matcher::kColmap);
+  EXPECT_EQ(line.pipeline.verification.matcher, VerificationOptions::Matcher::kColmap);
   EXPECT_THAT(line.pipeline.verification.colmap_options,
               Contains(Pair("FeatureMatching.type", "SIFT_LIGHTGLUE")));
   EXPECT_THAT(

@@ -285,7 +285,7 @@ class Mutation : public ::testing::Test {
     options.skip_image_pairs_in_same_frame = true;
     options.verification.timeout_per_pair = 2;
     if (mode % 3 == 1) options.strategy = PipelineOptions::Strategy::kExhaustive;
-    if (mode % 4 == 1) options.verification.matcher = ColmapVerifierOptions::Matcher::kColmap;
+    if (mode % 4 == 1) options.verification.matcher = VerificationOptions::Matcher::kColmap;
     if (mode % 5 == 1) options.verification.exact.preemptive_num_features = 20;
     return RunInChild([&] {
       const StopRequest stop;

@@ -5,8 +5,10 @@
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
+#include <deque>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <map>
 #include <set>
@@ -15,8 +17,11 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/verification/batch_verifier.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
+#include "colmap_graphmatch/verification/fault_isolation.h"
+#include "colmap_graphmatch/verification/shard_runner.h"
 #include "colmap_graphmatch/verification/subprocess.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 #include "tests/support/synthetic_database.h"
@@ -48,7 +53,7 @@ class VerifierTest : public ::testing::Test {
     WriteSyntheticDatabase(database_path_, Schema::kColmap38, MakePlaces(5, 5, 30, 1));
     options_.num_threads = 2;
     // These images match as the test double says, not as their descriptors do.
-    options_.matcher = ColmapVerifierOptions::Matcher::kColmap;
+    options_.matcher = VerificationOptions::Matcher::kColmap;
     options_.lock_timeout = 5;
   }
 
@@ -61,13 +66,16 @@ class VerifierTest : public ::testing::Test {
     Database database(database_path_, sqlite::Access::kReadWrite, 5);
     const WorkDirectory work(directory_.Path());
     const ColmapInstallation colmap = DetectColmap(FAKE_COLMAP_PATH, work.Path(), stop_);
-    ColmapVerifier verifier(options_, colmap, database, database.ReadImages(), work.Path(), stop_,
-                            [this](const std::string& warning) { warnings_.push_back(warning); });
+    const std::vector<ImageRecord> images = database.ReadImages();
+    const auto warn = [this](const std::string& warning) { warnings_.push_back(warning); };
+    const VerificationPlan plan = PlanVerification(options_, colmap);
+    ColmapVerifier geometry(options_, colmap, database_path_, images, work.Path(), stop_, warn);
+    BatchVerifier verifier(options_, plan, geometry, database, images, stop_, warn);
     const bool complete = verifier.Verify(pairs, [this](const VerifiedPair& pair) {
       EXPECT_TRUE(outcomes_.emplace(pair.pair, pair.outcome).second);
     });
     statistics_ = verifier.Statistics();
-    matched_here_ = verifier.MatchesHere();
+    matched_here_ = plan.matches_here;
     EXPECT_THAT(ShardDirectories(work.Path()), IsEmpty());
     return complete;
   }
@@ -102,10 +110,10 @@ class VerifierTest : public ::testing::Test {
 
   TestDirectory directory_;
   std::filesystem::path database_path_;
-  ColmapVerifierOptions options_;
+  VerificationOptions options_;
   StopRequest stop_;
   std::map<ImagePair, PairOutcome> outcomes_;
-  VerifierStatistics statistics_;
+  MatchingStatistics statistics_;
   bool matched_here_ = false;
   std::vector<std::string> warnings_;
 };
@@ -289,7 +297,7 @@ class ExactMatcherTest : public VerifierTest {
  protected:
   void SetUp() override {
     VerifierTest::SetUp();
-    options_.matcher = ColmapVerifierOptions::Matcher::kExact;
+    options_.matcher = VerificationOptions::Matcher::kExact;
   }
 
   static bool SamePlace(const ImagePair& pair) { return (pair.id1 - 1) / 5 == (pair.id2 - 1) / 5; }
@@ -404,8 +412,11 @@ TEST_F(ExactMatcherTest, FeaturesThatChangeMeanwhileAreAnError) {
   Database database(database_path_, sqlite::Access::kReadWrite, 5);
   const std::vector<ImageRecord> images = database.ReadImages();
   const WorkDirectory work(directory_.Path());
-  ColmapVerifier verifier(options_, DetectColmap(FAKE_COLMAP_PATH, work.Path(), stop_), database,
-                          images, work.Path(), stop_, [](const std::string&) {});
+  const ColmapInstallation colmap = DetectColmap(FAKE_COLMAP_PATH, work.Path(), stop_);
+  const auto ignore = [](const std::string&) {};
+  ColmapVerifier geometry(options_, colmap, database_path_, images, work.Path(), stop_, ignore);
+  BatchVerifier verifier(options_, PlanVerification(options_, colmap), geometry, database, images,
+                         stop_, ignore);
   sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
       .Execute("DELETE FROM descriptors WHERE image_id = 3");
   try {
@@ -440,7 +451,7 @@ TEST_F(ExactMatcherTest, GuidedMatchingNeedsDescriptors) {
 }
 
 TEST_F(ExactMatcherTest, AutoMatchesHereUnlessColmapHasAGpu) {
-  options_.matcher = ColmapVerifierOptions::Matcher::kAuto;
+  options_.matcher = VerificationOptions::Matcher::kAuto;
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_TRUE(matched_here_);
   Set("FAKE_COLMAP_VERSION", "COLMAP 3.10\n(Commit x on y with CUDA)");
@@ -454,7 +465,7 @@ TEST_F(ExactMatcherTest, AutoMatchesHereUnlessColmapHasAGpu) {
   EXPECT_TRUE(matched_here_);
   // COLMAP only verifies, for which it has no use for a GPU.
   options_.use_gpu = true;
-  options_.matcher = ColmapVerifierOptions::Matcher::kExact;
+  options_.matcher = VerificationOptions::Matcher::kExact;
   outcomes_.clear();
   EXPECT_TRUE(Verify({ImagePair(1, 5)}));
   EXPECT_TRUE(matched_here_);
@@ -590,6 +601,181 @@ TEST(Subprocess, ThatCannotStart) {
   const TestDirectory directory;
   EXPECT_THROW(RunSubprocess({"/nowhere/program"}, directory.Path() / "out.txt", 0, Never),
                ColmapError);
+}
+
+// Fails on shards with one of these pairs, and notes the sizes of all.
+class FailingOn : public GeometryVerifier {
+ public:
+  explicit FailingOn(std::set<ImagePair> pairs, int times = 1000000)
+      : guilty_(std::move(pairs)), times_(times) {}
+
+  ShardOutcome Verify(const std::vector<ShardPair>& pairs,
+                      const std::function<bool()>& /*should_stop*/) override {
+    sizes.push_back(pairs.size());
+    ShardOutcome outcome;
+    for (const ShardPair& pair : pairs) {
+      if (guilty_.count(pair.pair) > 0 && times_ > 0) outcome.problem = "failed";
+      PairRows rows;
+      rows.pair = pair.pair;
+      outcome.results.push_back(rows);
+    }
+    if (!outcome.problem.empty()) --times_;
+    return outcome;
+  }
+  int ConfigOfUnmatched() const override { return 0; }
+
+  std::vector<std::size_t> sizes;
+
+ private:
+  std::set<ImagePair> guilty_;
+  int times_;
+};
+
+class KeepingProgress : public ShardRunner::Progress {
+ public:
+  void Finish(ShardPart part) override {
+    for (const PairRows& rows : part.results) verified.insert(rows.pair);
+    for (const ShardPart::Failure& failure : part.failures) failed.insert(failure.first);
+  }
+  bool GivesUp() const override { return gives_up; }
+
+  std::set<ImagePair> verified;
+  std::set<ImagePair> failed;
+  bool gives_up = false;
+};
+
+std::vector<ShardPair> ShardOf(const std::vector<ImagePair>& pairs) {
+  std::vector<ShardPair> shard;
+  for (const ImagePair& pair : pairs) shard.push_back({pair, std::nullopt});
+  return shard;
+}
+
+TEST(FaultIsolation, FindsTheGuiltyPairs) {
+  const std::set<ImagePair> guilty = {ImagePair(1, 2), ImagePair(3, 5)};
+  FailingOn verifier(guilty);
+  KeepingProgress progress;
+  VerifyAndIsolate(verifier, ShardOf(AllPairs(9)), progress);
+  EXPECT_EQ(progress.failed, guilty);
+  EXPECT_EQ(progress.verified.size(), 34U);
+}
+
+TEST(FaultIsolation, TriesTheWholeShardAgainFirst) {
+  FailingOn verifier({ImagePair(1, 2)}, 1);
+  KeepingProgress progress;
+  VerifyAndIsolate(verifier, ShardOf(AllPairs(5)), progress);
+  EXPECT_THAT(verifier.sizes, ElementsAre(10, 10));
+  EXPECT_THAT(progress.verified, SizeIs(10));
+}
+
+TEST(FaultIsolation, GivesUpWhenAsked) {
+  FailingOn verifier({ImagePair(1, 2)});
+  KeepingProgress progress;
+  progress.gives_up = true;
+  VerifyAndIsolate(verifier, ShardOf(AllPairs(5)), progress);
+  EXPECT_THAT(verifier.sizes, IsEmpty());
+}
+
+class RunnerTest : public ::testing::Test {
+ protected:
+  static std::deque<ShardRunner::Shard> Shards(ImageId num) {
+    std::deque<ShardRunner::Shard> shards;
+    for (ImageId i = 1; i <= num; ++i) shards.push_back({ImagePair(i, 1000), ImagePair(i, 1001)});
+    return shards;
+  }
+
+  static ShardPart PartOf(const ShardRunner::Shard& shard) {
+    ShardPart part;
+    for (const ImagePair& pair : shard) {
+      part.results.emplace_back();
+      part.results.back().pair = pair;
+    }
+    return part;
+  }
+
+  // Counts the pairs that arrive, on the calling thread.
+  std::function<void(const ShardPart&)> Count() {
+    return [this, caller = std::this_thread::get_id()](const ShardPart& part) {
+      EXPECT_EQ(std::this_thread::get_id(), caller);
+      num_pairs_ += part.results.size();
+    };
+  }
+
+  StopRequest stop_;
+  std::size_t num_pairs_ = 0;
+};
+
+TEST_F(RunnerTest, EveryShardIsWorkedOnOnce) {
+  for (const std::size_t num_workers : {1, 2, 7}) {
+    num_pairs_ = 0;
+    ShardRunner(num_workers, stop_)
+        .Run(
+            Shards(50),
+            [](const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
+              progress.Finish(PartOf(shard));
+            },
+            Count());
+    EXPECT_EQ(num_pairs_, 100U);
+  }
+}
+
+TEST_F(RunnerTest, AWorkerWithoutRoomLeavesItsShardToTheOthers) {
+  std::atomic<int> num_running{0};
+  ShardRunner runner(6, stop_);
+  for (int run = 0; run < 2; ++run) {
+    num_pairs_ = 0;
+    runner.Run(
+        Shards(60),
+        [&](const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
+          // The system has room for two, and the first pair of a shard is done before it shows.
+          const bool has_room = ++num_running <= 2;
+          if (!has_room) progress.Finish(PartOf({shard.front()}));
+          std::this_thread::sleep_for(std::chrono::milliseconds(1));
+          --num_running;
+          if (!has_room) throw SystemLimitError("no more");
+          progress.Finish(PartOf(shard));
+        },
+        Count());
+    EXPECT_EQ(num_pairs_, 120U);
+  }
+}
+
+TEST_F(RunnerTest, WithoutRoomForAnyItEndsWithTheError) {
+  EXPECT_THROW(ShardRunner(3, stop_).Run(
+                   Shards(60),
+                   [](const ShardRunner::Shard&, ShardRunner::Progress&) {
+                     throw SystemLimitError("none at all");
+                   },
+                   Count()),
+               SystemLimitError);
+}
+
+TEST_F(RunnerTest, AnErrorOfAWorkerOrOfTheMergeEndsAll) {
+  const auto finish = [](const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
+    progress.Finish(PartOf(shard));
+  };
+  EXPECT_THROW(ShardRunner(3, stop_).Run(
+                   Shards(60),
+                   [&](const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
+                     if (shard.front().id1 == 30) throw DatabaseError("gone");
+                     finish(shard, progress);
+                   },
+                   Count()),
+               DatabaseError);
+  EXPECT_THROW(ShardRunner(3, stop_).Run(Shards(60), finish,
+                                         [](const ShardPart&) { throw DatabaseError("full"); }),
+               DatabaseError);
+}
+
+TEST_F(RunnerTest, AStopRequestLeavesShardsOut) {
+  ShardRunner(2, stop_).Run(
+      Shards(60),
+      [this](const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
+        if (shard.front().id1 == 10) stop_.Raise();
+        progress.Finish(PartOf(shard));
+      },
+      Count());
+  EXPECT_GE(num_pairs_, 20U);
+  EXPECT_LT(num_pairs_, 120U);
 }
 
 TEST_F(VerifierTest, NamesOfImagesReachNoShellAndNoListOfPairs) {

@@ -75,24 +75,25 @@ std::string FormatStage(const char* name, const StageStatistics& stage) {
 }
 
 // Where the time of matching went.
-std::string FormatVerification(const VerifierStatistics& statistics) {
+std::string FormatVerification(const PipelineResult& result) {
+  const MatchingStatistics& matching = result.descriptor_matching;
+  const ColmapVerifier::Statistics& colmap = result.colmap;
   std::string text;
-  if (statistics.num_matched > 0) {
-    text +=
-        fmt::format("Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
-                    statistics.num_matched, FormatDuration(statistics.matching_seconds),
-                    static_cast<double>(statistics.num_image_reads) /
-                        static_cast<double>(statistics.num_matched));
+  if (matching.num_matched > 0) {
+    text += fmt::format(
+        "Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
+        matching.num_matched, FormatDuration(matching.seconds),
+        static_cast<double>(matching.num_image_reads) / static_cast<double>(matching.num_matched));
   }
-  if (statistics.num_preempted > 0) {
-    text += fmt::format("Given up early     {} pairs\n", statistics.num_preempted);
+  if (matching.num_preempted > 0) {
+    text += fmt::format("Given up early     {} pairs\n", matching.num_preempted);
   }
-  const double both = statistics.matching_seconds + statistics.colmap_seconds;
+  const double both = matching.seconds + colmap.seconds;
   if (both > 0) {
     text += fmt::format(
         "COLMAP             {} pairs in {}, summed over its processes: {:.0f} % of {}\n",
-        statistics.num_verified, FormatDuration(statistics.colmap_seconds),
-        100 * statistics.colmap_seconds / both, "matching and verification");
+        colmap.num_verified, FormatDuration(colmap.seconds), 100 * colmap.seconds / both,
+        "matching and verification");
   }
   return text;
 }
@@ -455,7 +456,7 @@ std::string FormatSummary(const PipelineOptions& options, const PipelineResult& 
     text += fmt::format("Failed             {} pairs, see the warnings; they stay untested\n",
                         matching.failed_pairs.size());
   }
-  text += FormatVerification(result.verification);
+  text += FormatVerification(result);
   if (result.replayed) {
     text += fmt::format("Replayed           matching and verification would have taken some {}\n",
                         FormatDuration(result.modelled_seconds));

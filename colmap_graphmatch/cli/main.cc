@@ -160,10 +160,10 @@ int Run(const CommandLine& line, Console& console) {
       WarnIfNotWritten(std::cout, console);
     }
     WriteFiles(line, result, console);
-    const VerifierStatistics& verification = result.verification;
-    if (verification.num_failed > 0 && verification.num_verified == 0 &&
+    const std::size_t num_failed = result.descriptor_matching.num_failed;
+    if (num_failed > 0 && result.colmap.num_verified == 0 &&
         result.stopped_by != PipelineResult::StoppedBy::kRequest) {
-      console.Error("COLMAP failed on all " + std::to_string(verification.num_failed) +
+      console.Error("COLMAP failed on all " + std::to_string(num_failed) +
                     " pairs that it was given; the warnings above say how. They stay untested.");
       return kExitColmap;
     }

@@ -38,10 +38,10 @@ const Names<PipelineOptions::Strategy> kStrategies = {
     {"retrieval", PipelineOptions::Strategy::kRetrieval},
     {"briad", PipelineOptions::Strategy::kBriad},
     {"exhaustive", PipelineOptions::Strategy::kExhaustive}};
-const Names<ColmapVerifierOptions::Matcher> kMatchers = {
-    {"auto", ColmapVerifierOptions::Matcher::kAuto},
-    {"exact", ColmapVerifierOptions::Matcher::kExact},
-    {"colmap", ColmapVerifierOptions::Matcher::kColmap}};
+const Names<VerificationOptions::Matcher> kMatchers = {
+    {"auto", VerificationOptions::Matcher::kAuto},
+    {"exact", VerificationOptions::Matcher::kExact},
+    {"colmap", VerificationOptions::Matcher::kColmap}};
 const Names<ImageVectorOptions::Descriptor> kDescriptors = {
     {"fisher", ImageVectorOptions::Descriptor::kFisher},
     {"vlad", ImageVectorOptions::Descriptor::kVlad},

@@ -110,12 +110,12 @@ class Parser {
     }
     PipelineOptions& p = line_->pipeline;
     if (line_->lightglue) {
-      if (p.verification.matcher == ColmapVerifierOptions::Matcher::kExact) {
+      if (p.verification.matcher == VerificationOptions::Matcher::kExact) {
         throw OptionsError(
             "--FeatureMatching.type SIFT_LIGHTGLUE and --GraphMatching.matcher exact contradict "
             "each other: COLMAP alone has LightGlue. Give one of them.");
       }
-      p.verification.matcher = ColmapVerifierOptions::Matcher::kColmap;
+      p.verification.matcher = VerificationOptions::Matcher::kColmap;
       p.verification.colmap_options["FeatureMatching.type"] = "SIFT_LIGHTGLUE";
     }
     if (line_->seed_from_clock) {

@@ -300,20 +300,22 @@ void MatchWithColmap(const Job& job, const OnProgress& on_progress, RunRecord* r
   const auto warn = [&](const std::string& warning) { job.observer.OnWarning(warning); };
   const WorkDirectory work(options.work_path, WorkDirectory::Guard::kGuarded);
   const ColmapInstallation colmap = DetectColmap(options.colmap_path, work.Path(), job.stop);
-  ColmapVerifierOptions verifier_options = options.verification;
-  verifier_options.num_threads = options.num_threads;
-  ColmapVerifier verifier(verifier_options, colmap, job.database, job.images, work.Path(), job.stop,
-                          warn);
-  job.observer.OnInfo(std::string("Descriptors are matched ") +
-                      (verifier.MatchesHere() ? std::string("exactly, with ") + TopTwoTarget() + "."
-                                              : "by COLMAP."));
+  VerificationOptions verification = options.verification;
+  verification.num_threads = options.num_threads;
+  const VerificationPlan plan = PlanVerification(verification, colmap);
+  ColmapVerifier geometry(verification, colmap, job.database.Path(), job.images, work.Path(),
+                          job.stop, warn);
+  BatchVerifier verifier(verification, plan, geometry, job.database, job.images, job.stop, warn);
+  job.observer.OnInfo(
+      std::string("Descriptors are matched ") +
+      (plan.matches_here ? std::string("exactly, with ") + TopTwoTarget() + "." : "by COLMAP."));
   job.observer.OnInfo("COLMAP " + colmap.Version() + " at " + colmap.executable.string() + ", " +
-                      (verifier.UsesGpu() ? "GPU" : "CPU") +
-                      ", processes: " + std::to_string(verifier.NumProcesses()) +
-                      ", threads in each: " + std::to_string(verifier.NumThreadsPerProcess()) +
-                      ".");
+                      (plan.uses_gpu ? "GPU" : "CPU") +
+                      ", processes: " + std::to_string(plan.num_processes) +
+                      ", threads in each: " + std::to_string(plan.threads_per_process) + ".");
   result->matching = FindEdges(job, verifier, on_progress, record, result);
-  result->verification = verifier.Statistics();
+  result->descriptor_matching = verifier.Statistics();
+  result->colmap = geometry.SoFar();
 }
 
 // Makes the verifier that answers from the finished graph.

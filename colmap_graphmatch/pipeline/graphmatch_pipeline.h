@@ -14,7 +14,9 @@
 #include "colmap_graphmatch/pipeline/image_ranking.h"
 #include "colmap_graphmatch/pipeline/observer.h"
 #include "colmap_graphmatch/pipeline/run_record.h"
+#include "colmap_graphmatch/verification/batch_verifier.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
+#include "colmap_graphmatch/verification/options.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
 
 namespace colmap_graphmatch {
@@ -59,7 +61,7 @@ struct PipelineOptions {
   // Images that kRetrieval and kBriad retrieve for each; 0: 120, for kBriad 40, as in the paper.
   int num_retrieved_images = 0;
   int num_expansions = 4;
-  ColmapVerifierOptions verification;
+  VerificationOptions verification;
 
   // What the run may spend; then it ends as if it had been stopped.
   TestBudget budget;
@@ -98,7 +100,8 @@ struct PipelineResult {
   std::size_t num_images_without_features = 0;
   bool listed = false;  // The pairs were given, all or a list: no sampling, no propagation.
   GraphMatchResult matching;
-  VerifierStatistics verification;
+  MatchingStatistics descriptor_matching;  // Without a replay:
+  ColmapVerifier::Statistics colmap;       // what verification took.
   int num_threads = 1;
   bool replayed = false;
   ImageRankingSeconds preprocessing_seconds;

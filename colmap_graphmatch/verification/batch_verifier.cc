@@ -1,0 +1,243 @@
+#include "colmap_graphmatch/verification/batch_verifier.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/stopwatch.h"
+#include "colmap_graphmatch/matching/pair_order.h"
+#include "colmap_graphmatch/verification/fault_isolation.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// A batch is cut into about this many shards, so that up to as many processes have something to do.
+// Fixed: what a shard contains must not depend on the number of cores.
+constexpr std::size_t kShardsPerBatch = 64;
+
+// Below this the start of COLMAP and the copy of the features would cost more than a few per cent.
+constexpr std::size_t kMinPairsPerShard = 8;
+
+// How many times as many pairs are matched here at a time as COLMAP gets at most: where pairs are
+// rare that have enough matches, COLMAP would otherwise be started for one or two of them.
+constexpr std::size_t kPairsMatchedPerVerified = 4;
+
+// Pairs in a row, no two of them with an image in common and no other pair verified between them,
+// on which COLMAP has to fail to be given up. One bad image fails in many pairs, and they come
+// together.
+constexpr std::size_t kMaxUnrelatedFailures = 4;
+
+// Pairs that share images come into the same shard, and shards that do follow each other.
+std::vector<ShardRunner::Shard> CutIntoShards(std::vector<ImagePair> pairs,
+                                              std::size_t min_pairs_per_shard,
+                                              std::size_t max_pairs_per_shard) {
+  SortForReuse(&pairs);
+  const std::size_t wanted = (pairs.size() + kShardsPerBatch - 1) / kShardsPerBatch;
+  const std::size_t size = std::min(std::max(wanted, min_pairs_per_shard), max_pairs_per_shard);
+  std::vector<ShardRunner::Shard> shards;
+  for (std::size_t first = 0; first < pairs.size(); first += size) {
+    const auto begin = pairs.begin() + static_cast<std::ptrdiff_t>(first);
+    shards.emplace_back(begin,
+                        begin + static_cast<std::ptrdiff_t>(std::min(size, pairs.size() - first)));
+  }
+  return shards;
+}
+
+}  // namespace
+
+BatchVerifier::BatchVerifier(const VerificationOptions& options, const VerificationPlan& plan,
+                             GeometryVerifier& geometry, Database& database,
+                             const std::vector<ImageRecord>& images, const StopRequest& stop,
+                             const std::function<void(const std::string&)>& on_warning)
+    : options_(options),
+      geometry_(geometry),
+      database_(database),
+      stop_(stop),
+      on_warning_(on_warning),
+      runner_(static_cast<std::size_t>(plan.num_processes), stop) {
+  for (const ImageRecord& image : images) names_.emplace(image.id, image.name);
+  known_ = database.ReadVerifiedPairs(static_cast<std::size_t>(options.min_num_inliers));
+  if (!plan.matches_here) return;
+  exact_matcher_ = std::make_unique<ExactMatcher>(options.exact, database.Path(), images,
+                                                  sqlite::LockPatience(options.lock_timeout, &stop),
+                                                  static_cast<std::size_t>(plan.num_processes));
+  unverified_ = database.ReadUnverifiedPairs();
+  WarnOfCutFeatures(images);
+}
+
+void BatchVerifier::WarnOfCutFeatures(const std::vector<ImageRecord>& images) const {
+  if (!exact_matcher_) return;
+  const int limit = options_.exact.matching.max_num_matches;
+  const auto num_cut = std::count_if(images.begin(), images.end(), [&](const ImageRecord& image) {
+    return image.num_features > static_cast<std::size_t>(limit);
+  });
+  if (num_cut == 0) return;
+  on_warning_(std::to_string(num_cut) + " images have more than " + std::to_string(limit) +
+              " features (max_num_matches); only so many of each are matched.");
+}
+
+MatchingStatistics BatchVerifier::Statistics() const {
+  MatchingStatistics statistics;
+  statistics.seconds = matching_seconds_;
+  statistics.num_unmatched = num_unmatched_;
+  statistics.num_failed = num_failed_;
+  if (exact_matcher_) {
+    statistics.num_matched = exact_matcher_->NumPairs();
+    statistics.num_preempted = exact_matcher_->NumPreempted();
+    statistics.num_image_reads = exact_matcher_->NumReads();
+  }
+  return statistics;
+}
+
+void BatchVerifier::CheckThatItWorks(const ShardPart& part) {
+  if (!part.is_verified) return;
+  if (!part.results.empty()) {
+    failing_images_.clear();
+    has_verified_ = true;
+    return;
+  }
+  for (const auto& [pair, problem] : part.failures) {
+    if (failing_images_.count(pair.id1) + failing_images_.count(pair.id2) > 0) continue;
+    failing_images_.insert({pair.id1, pair.id2});
+    if (failing_images_.size() < 2 * kMaxUnrelatedFailures) continue;
+    const std::string advice = geometry_.AdviceOnFailure();
+    throw ColmapError((has_verified_
+                           ? "COLMAP has failed on " + std::to_string(kMaxUnrelatedFailures) +
+                                 " pairs in a row that have no image in common."
+                           : std::string("COLMAP fails on every pair of images.")) +
+                      " The last time it " + problem + (advice.empty() ? "" : "\n" + advice) +
+                      "\nWhat was verified before is kept.");
+  }
+}
+
+std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
+                                            ShardRunner::Progress& progress) {
+  std::vector<ShardPair> to_verify;
+  std::vector<ImagePair> to_match;
+  for (const ImagePair& pair : pairs) {
+    const bool has_matches = std::binary_search(unverified_.begin(), unverified_.end(), pair);
+    if (exact_matcher_ == nullptr || has_matches) {
+      to_verify.push_back({pair, std::nullopt});
+    } else {
+      to_match.push_back(pair);
+    }
+  }
+  if (to_match.empty()) return to_verify;
+
+  const double start = ThreadCpuSeconds();
+  std::vector<std::vector<FeatureMatch>> matches;
+  const auto should_stop = [&progress] { return progress.GivesUp(); };
+  if (!exact_matcher_->Match(to_match, should_stop, &matches)) return {};
+  ShardPart unmatched;
+  unmatched.is_verified = false;
+  for (std::size_t i = 0; i < to_match.size(); ++i) {
+    if (matches[i].size() < static_cast<std::size_t>(options_.min_num_inliers)) {
+      PairRows rows;
+      rows.pair = to_match[i];
+      rows.config = geometry_.ConfigOfUnmatched();
+      rows.num_dropped_matches = matches[i].size();
+      unmatched.results.push_back(std::move(rows));
+    } else {
+      const auto* bytes = reinterpret_cast<const std::uint8_t*>(matches[i].data());
+      to_verify.push_back(
+          {to_match[i], sqlite::Blob(bytes, bytes + matches[i].size() * sizeof(FeatureMatch))});
+    }
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    matching_seconds_ += ThreadCpuSeconds() - start;
+    num_unmatched_ += unmatched.results.size();
+  }
+  if (!unmatched.results.empty()) progress.Finish(std::move(unmatched));
+  return to_verify;
+}
+
+void BatchVerifier::Work(const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
+  const std::vector<ShardPair> to_verify = Match(shard, progress);
+  const auto size = static_cast<std::size_t>(options_.max_pairs_per_shard);
+  for (std::size_t first = 0; first < to_verify.size(); first += size) {
+    if (first > 0 && stop_.Requested()) break;
+    const auto begin = to_verify.begin() + static_cast<std::ptrdiff_t>(first);
+    const std::size_t num = std::min(size, to_verify.size() - first);
+    VerifyAndIsolate(geometry_, {begin, begin + static_cast<std::ptrdiff_t>(num)}, progress);
+  }
+}
+
+std::vector<VerifiedPair> BatchVerifier::Write(const std::vector<PairRows>& results) {
+  std::vector<VerifiedPair> written;
+  if (results.empty()) return written;
+  const std::vector<TestedPair> of_others = database_.WritePairs(results);
+  auto other = of_others.begin();
+  for (const PairRows& rows : results) {
+    VerifiedPair verified;
+    verified.pair = rows.pair;
+    std::size_t num_inliers = rows.num_inliers;
+    int config = rows.config;
+    if (other != of_others.end() && other->pair == rows.pair) {
+      num_inliers = other->num_inliers;
+      config = other->config;
+      ++other;
+    } else {
+      verified.num_matches = static_cast<std::int32_t>(rows.num_matches + rows.num_dropped_matches);
+    }
+    const bool is_edge =
+        IsEdge(num_inliers, config, static_cast<std::size_t>(options_.min_num_inliers));
+    verified.outcome = is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge;
+    verified.num_inliers = static_cast<std::uint32_t>(num_inliers);
+    written.push_back(verified);
+  }
+  return written;
+}
+
+std::deque<ShardRunner::Shard> BatchVerifier::Cut(
+    const std::vector<ImagePair>& pairs,
+    const std::function<void(const VerifiedPair&)>& on_verified) const {
+  // Shards are cut before known pairs are taken out: a run that goes on after an interruption then
+  // gives COLMAP the same shards, and gets the same answers, as one that was never interrupted.
+  std::deque<ShardRunner::Shard> shards;
+  const std::size_t factor = exact_matcher_ ? kPairsMatchedPerVerified : 1;
+  for (ShardRunner::Shard& shard :
+       CutIntoShards(pairs, factor * kMinPairsPerShard,
+                     factor * static_cast<std::size_t>(options_.max_pairs_per_shard))) {
+    const auto unknown_end = std::stable_partition(
+        shard.begin(), shard.end(),
+        [this](const ImagePair& pair) { return FindPair(known_, pair) == nullptr; });
+    for (auto pair = unknown_end; pair != shard.end(); ++pair) {
+      on_verified(*FindPair(known_, *pair));
+    }
+    shard.erase(unknown_end, shard.end());
+    if (!shard.empty()) shards.push_back(std::move(shard));
+  }
+  return shards;
+}
+
+bool BatchVerifier::Verify(const std::vector<ImagePair>& pairs,
+                           const std::function<void(const VerifiedPair&)>& on_verified) {
+  std::deque<ShardRunner::Shard> shards = Cut(pairs, on_verified);
+  if (shards.empty()) return true;
+  std::size_t num_unanswered = 0;
+  for (const ShardRunner::Shard& shard : shards) num_unanswered += shard.size();
+  const auto merge = [&](const ShardPart& part) {
+    CheckThatItWorks(part);
+    for (const VerifiedPair& verified : Write(part.results)) {
+      --num_unanswered;
+      on_verified(verified);
+    }
+    for (const auto& [pair, problem] : part.failures) {
+      on_warning_("COLMAP failed on the pair \"" + names_.at(pair.id1) + "\" and \"" +
+                  names_.at(pair.id2) + "\", which stays untested. It " + problem);
+      --num_unanswered;
+      ++num_failed_;
+      on_verified({pair, PairOutcome::kFailed, 0});
+    }
+  };
+  runner_.Run(
+      std::move(shards),
+      [this](const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
+        Work(shard, progress);
+      },
+      merge);
+  return num_unanswered == 0;
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "colmap_graphmatch/verification/colmap_installation.h"
+#include "colmap_graphmatch/verification/exact_matcher.h"
+
+namespace colmap_graphmatch {
+
+struct VerificationOptions {
+  // Who matches descriptors; COLMAP gets the options of exact.matching. kAuto: COLMAP if it has a
+  // GPU and may use it, else this library.
+  enum class Matcher { kAuto, kExact, kColmap };
+  Matcher matcher = Matcher::kAuto;
+
+  ExactMatcherOptions exact;
+
+  // The cores that all COLMAP processes together may use; -1: all.
+  int num_threads = -1;
+
+  // COLMAP processes at a time; each gets num_threads / num_processes threads. 0: num_threads
+  // processes of one thread without a GPU, and one process with it (docs/design.md). Descriptors
+  // are matched by one thread for each process, when that process does not run.
+  int num_processes = 0;
+
+  // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
+  bool use_gpu = true;
+
+  // A pair is an edge with this many inliers, 0 being as good as 1. Also handed to COLMAP.
+  int min_num_inliers = 15;
+
+  // Other options of COLMAP's feature matching and geometric verification, by their names in any
+  // version (e.g. "SiftMatching.max_error") or without a group, as COLMAP is to get them. What is
+  // not here keeps COLMAP's own default. Those of exact.matching do not belong here: COLMAP gets
+  // them from there.
+  std::map<std::string, std::string> colmap_options;
+
+  // Pairs a shard at most, the amount of work that a crash of COLMAP or kill -9 can lose.
+  int max_pairs_per_shard = 64;
+
+  // Seconds that COLMAP may take for a pair before it counts as hanging. Once shards have come
+  // back, one that takes more than 20 times as long a pair as the slowest of them counts as
+  // hanging, too.
+  double timeout_per_pair = 60;
+
+  // Seconds to wait for locks of other processes on the user's database.
+  double lock_timeout = 60;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+// The value of an option in colmap_options, in whatever group it was given, or null.
+const std::string* FindOption(const std::map<std::string, std::string>& options,
+                              const std::string& name);
+
+// What the options come to with the COLMAP that is installed.
+struct VerificationPlan {
+  bool matches_here = true;  // Descriptors, by this library.
+  bool uses_gpu = false;     // COLMAP does.
+  int num_processes = 1;     // Of COLMAP, at a time,
+  int threads_per_process = 1;
+};
+
+VerificationPlan PlanVerification(const VerificationOptions& options,
+                                  const ColmapInstallation& colmap);
+
+}  // namespace colmap_graphmatch
