@@ -151,21 +151,24 @@ TEST_F(FilesTest, PipesAndDevicesAreWrittenTo) {
               ThrowsMessage<FileError>(HasSubstr("No space left on device")));
 }
 
-TEST_F(FilesTest, WhatTheProgramHasOpenIsAppendedTo) {
+TEST_F(FilesTest, WhatTheProgramHasOpenIsWrittenOnWith) {
   const std::filesystem::path path = directory_ / "output";
   std::ofstream(path) << "before\n";
   const int number = ::open(path.c_str(), O_RDWR);
   struct stat before = {};
   ::fstat(number, &before);
   std::filesystem::create_symlink("/dev/fd/" + std::to_string(number), directory_ / "link");
+  ::lseek(number, 0, SEEK_END);
   Write("/dev/fd/" + std::to_string(number), "1\n");
   Write("/proc/self/fd/" + std::to_string(number), "2\n");
   Write(directory_ / "link", "3\n");
+  // What is printed there by other means comes behind.
+  EXPECT_EQ(::write(number, "4\n", 2), 2);
   struct stat after = {};
   ::stat(path.c_str(), &after);
   ::close(number);
   EXPECT_EQ(before.st_ino, after.st_ino);
-  EXPECT_EQ(Content(path), "before\n1\n2\n3\n");
+  EXPECT_EQ(Content(path), "before\n1\n2\n3\n4\n");
 }
 
 TEST_F(FilesTest, DatabasesAndWhatBelongsToThemAreNeverWritten) {
@@ -181,6 +184,9 @@ TEST_F(FilesTest, DatabasesAndWhatBelongsToThemAreNeverWritten) {
   }
   EXPECT_EQ(Content(database), content);
   EXPECT_THAT(Names(), ElementsAre("link.txt", "other.db"));
+  std::ofstream(directory_ / "photo.jpg") << "\xFF\xD8\xFF\xE0";
+  EXPECT_THAT([&] { Write(directory_ / "photo.jpg", "x"); },
+              ThrowsMessage<FileError>(HasSubstr("it is a photo")));
   // Without such a database it is a name like others.
   Write(directory_ / "a-wal", "x");
 }

@@ -214,6 +214,21 @@ TEST_F(StateFileTest, WhoMayNotReadTheDatabaseMayNotReadItEither) {
   EXPECT_EQ(rights() & perms::group_read, perms::group_read);
 }
 
+TEST_F(StateFileTest, WhatIsNotItsOwnKeepsItsRights) {
+  using std::filesystem::perms;
+  std::ofstream(database_path_) << "a database";
+  std::filesystem::permissions(database_path_, perms(0600));
+  const std::filesystem::path script = directory_.Path() / "script";
+  std::ofstream(script) << "#!/bin/sh\n";
+  std::filesystem::permissions(script, perms(0755));
+  std::filesystem::create_symlink("script", path_);
+  EXPECT_THROW(StateFile(database_path_, 1), DatabaseError);
+  EXPECT_EQ(std::filesystem::status(script).permissions(), perms(0755));
+  std::filesystem::remove(script);
+  EXPECT_THROW(StateFile(database_path_, 1), DatabaseError);
+  EXPECT_FALSE(std::filesystem::exists(script));
+}
+
 TEST_F(StateFileTest, APipeInItsPlaceIsLeftAlone) {
   ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
   EXPECT_THROW(StateFile(database_path_, 1), DatabaseError);

@@ -7,15 +7,15 @@
 
 #include <array>
 #include <cerrno>
-#include <cstdint>
 #include <cstring>
+#include <string_view>
 
 #include "colmap_graphmatch/base/file_descriptor.h"
 
 namespace colmap_graphmatch {
 namespace {
 
-constexpr std::uintmax_t kMaxPhotoBytes = std::uintmax_t{1} << 30;
+constexpr off_t kMaxPhotoBytes = off_t{1} << 30;
 
 std::string DescribeKind(mode_t mode) {
   if (S_ISDIR(mode)) return std::strerror(EISDIR);
@@ -48,6 +48,54 @@ std::string ReadPipe(const std::filesystem::path& path, int number, const StopRe
   }
 }
 
+struct OpenedFile {
+  FileDescriptor descriptor;
+  struct stat status = {};
+};
+
+// Without waiting, whatever it is. Not for devices, sockets and directories.
+OpenedFile Open(const std::filesystem::path& path) {
+  OpenedFile file = {
+      FileDescriptor(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY))};
+  if (file.descriptor.Number() < 0 || ::fstat(file.descriptor.Number(), &file.status) != 0) {
+    throw UnreadableFileError(path, std::strerror(errno));
+  }
+  const mode_t mode = file.status.st_mode;
+  if (!S_ISREG(mode) && !S_ISFIFO(mode)) throw UnreadableFileError(path, DescribeKind(mode));
+  return file;
+}
+
+// All of a regular file.
+template <typename Bytes>
+Bytes ReadAll(const std::filesystem::path& path, const OpenedFile& file) {
+  if (!S_ISREG(file.status.st_mode)) {
+    throw UnreadableFileError(path, DescribeKind(file.status.st_mode));
+  }
+  Bytes bytes(static_cast<std::size_t>(file.status.st_size), 0);
+  std::size_t num_read = 0;
+  while (true) {
+    if (num_read == bytes.size()) bytes.resize(num_read + 4096);  // It may be growing.
+    const ssize_t size =
+        ::read(file.descriptor.Number(), bytes.data() + num_read, bytes.size() - num_read);
+    if (size == 0) break;
+    if (size < 0 && errno != EINTR) throw UnreadableFileError(path, std::strerror(errno));
+    if (size > 0) num_read += static_cast<std::size_t>(size);
+  }
+  bytes.resize(num_read);
+  return bytes;
+}
+
+// The first 16 bytes; fewer, or none, if there is no such regular file.
+std::string Beginning(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return "";
+  std::string bytes(16, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  return bytes;
+}
+
 }  // namespace
 
 std::string WhyNotRegular(const std::filesystem::path& path) {
@@ -65,55 +113,38 @@ std::ifstream OpenRegularFile(const std::filesystem::path& path) {
 }
 
 std::string ReadText(const std::filesystem::path& path, const StopRequest* stop) {
-  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
-  const int number = file.Number();
-  if (number < 0) throw UnreadableFileError(path, std::strerror(errno));
-  struct stat status = {};
-  if (::fstat(number, &status) != 0) throw UnreadableFileError(path, std::strerror(errno));
-  if (S_ISFIFO(status.st_mode)) return ReadPipe(path, number, stop);
-  if (!S_ISREG(status.st_mode)) throw UnreadableFileError(path, DescribeKind(status.st_mode));
-  std::string text(static_cast<std::size_t>(status.st_size), '\0');
-  std::size_t num_read = 0;
-  while (true) {
-    if (num_read == text.size()) text.resize(num_read + 4096);  // It may be growing.
-    const ssize_t size = ::read(number, text.data() + num_read, text.size() - num_read);
-    if (size == 0) break;
-    if (size < 0 && errno != EINTR) throw UnreadableFileError(path, std::strerror(errno));
-    if (size > 0) num_read += static_cast<std::size_t>(size);
-  }
-  text.resize(num_read);
-  return text;
+  const OpenedFile file = Open(path);
+  if (S_ISFIFO(file.status.st_mode)) return ReadPipe(path, file.descriptor.Number(), stop);
+  return ReadAll<std::string>(path, file);
 }
 
 std::vector<unsigned char> ReadPhoto(const std::filesystem::path& directory,
                                      const std::string& name) {
   const std::filesystem::path relative = std::filesystem::u8path(name);
-  const std::filesystem::path path = directory / relative;
   if (!StaysBelow(relative)) {
     throw UnreadableFileError(name, "the name leads out of the directory of the photos");
   }
-  std::ifstream file = OpenRegularFile(path);
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) throw UnreadableFileError(path, error.message());
-  if (size == 0) throw UnreadableFileError(path, "it is empty");
-  if (size > kMaxPhotoBytes) {
+  const std::filesystem::path path = directory / relative;
+  const OpenedFile file = Open(path);
+  if (file.status.st_size == 0) throw UnreadableFileError(path, "it is empty");
+  if (file.status.st_size > kMaxPhotoBytes) {
     throw UnreadableFileError(path, "it has more than 1 GiB, which no photo has");
   }
-  std::vector<unsigned char> bytes(size);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (!file) throw UnreadableFileError(path, "it ends early");
-  return bytes;
+  return ReadAll<std::vector<unsigned char>>(path, file);
 }
 
 bool IsSqliteFile(const std::filesystem::path& path) {
-  constexpr std::array<char, 16> kMagic = {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f',
-                                           'o', 'r', 'm', 'a', 't', ' ', '3', '\0'};
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) return false;
-  std::array<char, kMagic.size()> begin = {};
-  std::ifstream file(path, std::ios::binary);
-  return file.read(begin.data(), begin.size()) && begin == kMagic;
+  return Beginning(path) == std::string_view("SQLite format 3\0", 16);
+}
+
+bool IsPhotoFile(const std::filesystem::path& path) {
+  const std::string beginning = Beginning(path);
+  const auto begins = [&beginning](std::string_view with, std::size_t at = 0) {
+    return beginning.size() >= at + with.size() &&
+           std::string_view(beginning).substr(at, with.size()) == with;
+  };
+  return begins("\xFF\xD8\xFF") || begins("\x89PNG") || begins(std::string_view("II*\0", 4)) ||
+         begins(std::string_view("MM\0*", 4)) || (begins("RIFF") && begins("WEBP", 8));
 }
 
 }  // namespace colmap_graphmatch

@@ -42,7 +42,9 @@ std::string ReadText(const std::filesystem::path& path, const StopRequest* stop)
 std::vector<unsigned char> ReadPhoto(const std::filesystem::path& directory,
                                      const std::string& name);
 
-// Whether a file begins as SQLite's do.
+// Whether there is a regular file that begins as SQLite's do, or as photos do (JPEG, PNG, TIFF,
+// WebP).
 bool IsSqliteFile(const std::filesystem::path& path);
+bool IsPhotoFile(const std::filesystem::path& path);
 
 }  // namespace colmap_graphmatch

@@ -31,9 +31,12 @@ namespace {
 
 // Gives a file the rights of the one whose place it takes: who may not read that may not read this.
 void TakeAfter(const struct stat& status, int number) {
-  // Root alone may give a file away.
-  if (::fchown(number, status.st_uid, status.st_gid) != 0) errno = 0;
-  ::fchmod(number, status.st_mode & 0777U);
+  mode_t mode = status.st_mode & 0777U;
+  // Root alone may give a file away, and others only to a group of theirs.
+  const bool is_of_the_group = ::fchown(number, status.st_uid, status.st_gid) == 0 ||
+                               ::fchown(number, static_cast<uid_t>(-1), status.st_gid) == 0;
+  if (!is_of_the_group) mode &= ~static_cast<mode_t>(S_IRWXG);
+  ::fchmod(number, mode);
 }
 
 // Where the output goes.
@@ -42,14 +45,31 @@ struct Target {
   bool is_new = true;
   bool is_replaced = true;  // Else it is written to.
   struct stat status = {};  // Of what is there.
+  int descriptor = -1;      // Of this process, which has it open.
 };
 
+// Whether a path leads into /dev or /proc.
 bool IsOfTheSystem(const std::filesystem::path& path) {
   std::error_code ignored;
   const std::filesystem::path directory =
       std::filesystem::weakly_canonical(std::filesystem::absolute(path).parent_path(), ignored);
   const auto first = directory.begin() == directory.end() ? directory.end() : ++directory.begin();
   return directory == "/dev" || (first != directory.end() && *first == "proc");
+}
+
+// The descriptor of this process that a path in /dev or /proc stands for; negative: none.
+int DescriptorOf(const std::filesystem::path& path) {
+  if (path == "/dev/stdout") return STDOUT_FILENO;
+  if (path == "/dev/stderr") return STDERR_FILENO;
+  std::error_code ignored;
+  const std::filesystem::path own =
+      std::filesystem::canonical("/proc/self/fd", ignored);  // /proc/PID/fd
+  const std::string name = path.filename().string();
+  const bool is_number =
+      !name.empty() && name.size() < 8 && name.find_first_not_of("0123456789") == std::string::npos;
+  return is_number && std::filesystem::canonical(path.parent_path(), ignored) == own
+             ? std::stoi(name)
+             : -1;
 }
 
 Target FindTarget(const std::filesystem::path& path) {
@@ -72,6 +92,7 @@ Target FindTarget(const std::filesystem::path& path) {
       if (S_ISDIR(status.st_mode)) FailWith(path, EISDIR);
       target.is_new = false;
       target.is_replaced = S_ISREG(status.st_mode) && !is_of_the_system;
+      if (is_of_the_system) target.descriptor = DescriptorOf(target.path);
       target.status = status;
       return target;
     }
@@ -83,9 +104,14 @@ Target FindTarget(const std::filesystem::path& path) {
   FailWith(path, ELOOP);
 }
 
-void ProtectDatabases(const std::filesystem::path& path, const Target& target) {
-  if (target.is_replaced && !target.is_new && IsSqliteFile(target.path)) {
-    Fail(path, "it is a SQLite database. Name another file, or delete this one first");
+void ProtectInputs(const std::filesystem::path& path, const Target& target) {
+  if (target.is_replaced && !target.is_new) {
+    const std::string kind = IsSqliteFile(target.path)  ? "a SQLite database"
+                             : IsPhotoFile(target.path) ? "a photo"
+                                                        : "";
+    if (!kind.empty()) {
+      Fail(path, "it is " + kind + ". Name another file, or delete this one first");
+    }
   }
   for (const char* suffix : {"-wal", "-shm", "-journal"}) {
     const std::string name = target.path.string();
@@ -100,6 +126,12 @@ void ProtectDatabases(const std::filesystem::path& path, const Target& target) {
 
 // Opens what is not replaced.
 int OpenInPlace(const std::filesystem::path& path, const Target& target, int flags) {
+  if (target.descriptor >= 0) {
+    // Not opened anew: what is printed there as well would be written over it.
+    const int copy = ::fcntl(target.descriptor, F_DUPFD_CLOEXEC, 0);
+    if (copy < 0) FailWith(path, errno);
+    return copy;
+  }
   // Without a reader a pipe would be waited for.
   const int number = ::open(target.path.c_str(),
                             O_WRONLY | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK | flags, 0666);
@@ -188,7 +220,7 @@ namespace {
 
 int OpenToGrow(const std::filesystem::path& path, GrowingFile::Mode mode) {
   const Target target = FindTarget(path);
-  ProtectDatabases(path, target);
+  ProtectInputs(path, target);
   const bool is_emptied = mode == GrowingFile::Mode::kAnew && target.is_replaced;
   return OpenInPlace(path, target, is_emptied ? O_TRUNC : O_APPEND);
 }
@@ -241,7 +273,7 @@ int GrowingFile::Error() const { return buffer_->Error(); }
 void WriteWholeFile(const std::filesystem::path& path,
                     const std::function<void(std::ostream&)>& write) {
   const Target target = FindTarget(path);
-  ProtectDatabases(path, target);
+  ProtectInputs(path, target);
   if (!target.is_replaced) {
     const int error = WriteAndClose(OpenInPlace(path, target, O_APPEND), false, write);
     if (error != 0) FailWith(path, error);
@@ -255,9 +287,12 @@ void WriteWholeFile(const std::filesystem::path& path,
   if (error != 0) FailWith(path, error);
 }
 
+bool IsReplacedAsAWhole(const std::filesystem::path& path) { return FindTarget(path).is_replaced; }
+
 void CheckCanWrite(const std::filesystem::path& path) {
   const Target target = FindTarget(path);
-  ProtectDatabases(path, target);
+  ProtectInputs(path, target);
+  if (target.descriptor >= 0) return;
   if (!target.is_new && ::access(target.path.c_str(), W_OK) != 0) FailWith(path, errno);
   // A pipe is not opened: its reader would take the end of this check for the end of the file.
   if (!target.is_replaced) return;

@@ -12,13 +12,16 @@ class DescriptorBuffer;
 // Files that a user asked for: reports, exports, logs.
 //
 // A regular file is replaced as a whole, where links to it lead; one that is none (a pipe, a
-// device, /dev/stdout) is written to. A SQLite database, and what SQLite keeps beside one, is never
-// replaced or written to. All functions throw FileError.
+// device, /dev/stdout) is written to. A SQLite database, what SQLite keeps beside one, and a photo
+// are never replaced or written to. All functions throw FileError.
 
 // Writes a file under a name that nobody else has, in the same directory, and then gives it its
 // own: at no time is there a half-written one, not even after a loss of power.
 void WriteWholeFile(const std::filesystem::path& path,
                     const std::function<void(std::ostream&)>& write);
+
+// Whether that is what WriteWholeFile would do; else it would write to what there is.
+bool IsReplacedAsAWhole(const std::filesystem::path& path);
 
 // Whether that can be expected to go well, before something is computed for long. Leaves what is
 // there.

@@ -9,7 +9,6 @@
 #include <exception>
 #include <mutex>
 #include <string>
-#include <system_error>
 #include <thread>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -17,11 +16,11 @@
 namespace colmap_graphmatch {
 
 ThreadGroup::ThreadGroup(std::size_t num_threads, const std::function<void()>& work) {
-  threads_.reserve(num_threads);
   try {
+    threads_.reserve(num_threads);
     while (threads_.size() < num_threads) threads_.emplace_back(work);
-  } catch (const std::system_error&) {
-    // Those that there are do it.
+  } catch (const std::exception&) {
+    // For want of threads or of memory: those that there are do it.
   }
 }
 

@@ -328,7 +328,9 @@ void Console::Log(int level, const std::string& message, bool on_terminal) {
   if (!file_log_) return;
   file_log_->log(now, spdlog::source_loc(), severity, text);
   if (file_->Error() == 0 || std::exchange(said_log_fails_, true)) return;
-  terminal_log_->log(now, spdlog::source_loc(), spdlog::level::warn,
+  // Whatever else is not to be said there: nobody could know otherwise.
+  terminal_log_->log(now, spdlog::source_loc(),
+                     std::max(spdlog::level::warn, terminal_log_->level()),
                      fmt::format("The log {} cannot be written any more: {}. The run goes on.",
                                  options_.FilePath().string(), std::strerror(file_->Error())));
 }

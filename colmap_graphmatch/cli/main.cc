@@ -58,6 +58,8 @@ void HandleSignals() {
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
   ::sigaction(SIGCONT, &action, nullptr);
+  // The soft limit of CPU time: some seconds are left.
+  ::sigaction(SIGXCPU, &action, nullptr);
   // The terminal is gone; with nohup the signal is ignored already and stays so.
   struct sigaction hangup = {};
   ::sigaction(SIGHUP, nullptr, &hangup);
@@ -178,8 +180,8 @@ int Run(const CommandLine& line, Console& console) {
     // Before the first pair: there is nothing to sum up.
   }
   console.OnInfo(line.pipeline.replay_path.empty()
-                     ? "Stopped as asked. Everything verified so far is in the database; run the "
-                       "same command again to go on from here."
+                     ? "Stopped as asked. What was tested is in the database; run the same command "
+                       "again to go on from here."
                      : "Stopped as asked.");
   return kExitInterrupted;
 }

@@ -36,8 +36,8 @@ bool IsSame(const std::filesystem::path& a, const std::filesystem::path& b) {
 // Whether a file is what this program writes beside another, as far as can be told.
 bool IsOurs(const RunFile& file) {
   std::error_code ignored;
-  if (!std::filesystem::exists(file.path, ignored)) return true;
-  return std::filesystem::exists(file.beside, ignored);
+  return !std::filesystem::exists(file.path, ignored) ||
+         std::filesystem::exists(file.beside, ignored) || IsJsonReport(file.path);
 }
 
 }  // namespace
@@ -98,7 +98,7 @@ void CheckThatFilesDiffer(const std::vector<RunFile>& files) {
     if (!is_output(file)) continue;
     for (const RunFile& other : files) {
       if (&other == &file || !IsSame(file.path, other.path)) continue;
-      if (is_output(other) && !WhyNotRegular(file.path).empty()) continue;
+      if (is_output(other) && !IsReplacedAsAWhole(file.path)) continue;
       throw OptionsError(file.option + " and " + other.option + " are the same file, " +
                          file.path.string() + ": one would take the place of the other.");
     }

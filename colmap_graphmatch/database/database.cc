@@ -484,19 +484,16 @@ void Database::ExpectFeatures(const std::vector<ImageRecord>& images,
 }
 
 bool Database::HasFeatures(const ImageRecord& image, std::int64_t features) {
-  // Their number is part of the fingerprint: as it is now.
-  sqlite::Statement select(connection_, "SELECT rows FROM descriptors WHERE image_id = ?1");
+  // Their number is part of the fingerprint: as it is now. Without blobs there is none.
+  sqlite::Statement select(
+      connection_,
+      "SELECT descriptors.rows FROM descriptors JOIN keypoints USING(image_id) WHERE image_id = ?1 "
+      "AND typeof(descriptors.data) = 'blob' AND typeof(keypoints.data) = 'blob'");
   if (!select.Bind(1, std::int64_t{image.id}).Step()) return false;
   ImageRecord now = image;
   now.num_features = static_cast<std::size_t>(std::max<std::int64_t>(0, select.Int(0)));
-  try {
-    const std::vector<ImageFingerprint> found = ReadFingerprints({now});
-    return !found.empty() && found.front().features == features;
-  } catch (const DatabaseLockedError&) {
-    throw;
-  } catch (const DatabaseError&) {
-    return false;  // There is no blob any more.
-  }
+  const std::vector<ImageFingerprint> found = ReadFingerprints({now});
+  return !found.empty() && found.front().features == features;
 }
 
 void Database::CheckFeatures(const std::vector<PairRows>& pairs) {
@@ -535,8 +532,7 @@ std::vector<TestedPair> Database::WritePairs(const std::vector<PairRows>& pairs)
     for (const char* table : {"matches", "two_view_geometries"}) connection_.CheckPages(table);
     pages_are_checked_ = true;
   }
-  // What was computed is only given up when somebody is in a hurry.
-  connection_.GiveUpAt(StopRequest::kAbandonShards);
+  connection_.FinishWrites();
   std::vector<std::string> columns = {"pair_id", "rows", "cols", "data", "config"};
   std::string parameters = "?1, ?2, ?3, ?4, ?5";
   for (const std::size_t i : geometry_columns_) {

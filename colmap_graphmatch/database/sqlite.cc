@@ -7,15 +7,19 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <mutex>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/input_file.h"
 #include "colmap_graphmatch/base/stopwatch.h"
+#include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/database/lock_holder.h"
 
 namespace colmap_graphmatch::sqlite {
@@ -151,14 +155,23 @@ std::vector<std::filesystem::path> FilesBeside(const std::filesystem::path& data
 struct Connection::Waiting {
   explicit Waiting(const LockPatience& with) : patience(with) {}
 
+  // How long a write that is to be finished waits after the stop request.
+  static constexpr double kSecondsToFinish = 2;
+
   LockPatience patience;
-  StopRequest::Level give_up_at = StopRequest::kFinishShards;
+  bool finishes_writes = false;
   Stopwatch since;  // The first try.
 
-  bool Stops() const {
-    const StopRequest* stop = patience.stop;
-    if (stop == nullptr) return false;
-    return give_up_at == StopRequest::kAbandonShards ? stop->Abandon() : stop->Requested();
+  Stopwatch since_request;
+  bool is_requested = false;
+
+  bool IsRequested() const { return patience.stop != nullptr && patience.stop->Requested(); }
+
+  bool Stops() {
+    if (!IsRequested()) return false;
+    if (!std::exchange(is_requested, true)) since_request = Stopwatch();
+    return !finishes_writes || patience.stop->Abandon() ||
+           since_request.Seconds() > kSecondsToFinish;
   }
 
   // SQLite's handler: whether to try again.
@@ -173,6 +186,42 @@ struct Connection::Waiting {
     return 1;
   }
 };
+
+namespace {
+
+// While it lives, a stop request ends what SQLite does: what takes long in one step, and asks
+// nobody.
+class InterruptedByStop {
+ public:
+  InterruptedByStop(sqlite3* db, const StopRequest* stop)
+      : thread_(stop == nullptr ? 0 : 1, [this, db, stop] { Watch(db, *stop); }) {}
+  ~InterruptedByStop() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_over_ = true;
+    }
+    over_.notify_one();
+    thread_.Join();
+  }
+  InterruptedByStop(const InterruptedByStop&) = delete;
+  InterruptedByStop& operator=(const InterruptedByStop&) = delete;
+
+ private:
+  void Watch(sqlite3* db, const StopRequest& stop) {
+    constexpr std::chrono::milliseconds kInterval(50);
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!over_.wait_for(lock, kInterval, [this] { return is_over_; })) {
+      if (stop.Requested()) sqlite3_interrupt(db);
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable over_;
+  bool is_over_ = false;
+  ThreadGroup thread_;  // The last: it uses the others.
+};
+
+}  // namespace
 
 Connection::~Connection() = default;
 Connection::Connection(Connection&&) noexcept = default;
@@ -236,7 +285,7 @@ void Connection::AttachReadOnly(const std::filesystem::path& path, const std::st
   lockable_path_ = path;
 }
 
-void Connection::GiveUpAt(StopRequest::Level level) { waiting_->give_up_at = level; }
+void Connection::FinishWrites() { waiting_->finishes_writes = true; }
 
 bool Connection::HasMoved() {
   int has_moved = 0;
@@ -252,6 +301,7 @@ std::int64_t Connection::DataVersion() {
 
 void Connection::CheckPages(const std::string& table) {
   Statement check(*this, "PRAGMA main.quick_check('" + table + "')");
+  const InterruptedByStop interruptible(db_.get(), waiting_->patience.stop);
   while (check.Step()) {
     // Other lines speak of values in rows, which no write makes worse.
     const std::string line = check.Text(0);
@@ -287,7 +337,7 @@ void Connection::Throw(const std::string& doing) const {
   switch (disk_is_full ? SQLITE_FULL : kind) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      if (waiting_->Stops()) throw StoppedError();
+      if (waiting_->IsRequested()) throw StoppedError();
       throw DatabaseLockedError(what + "another process kept it locked for " +
                                 Seconds(waiting_->patience.seconds) + " (" +
                                 DescribeLockHolders(lockable_path_) +
@@ -298,6 +348,7 @@ void Connection::Throw(const std::string& doing) const {
                              " is not a SQLite database. Give the database.db that "
                              "`colmap feature_extractor` wrote.");
     case SQLITE_INTERRUPT:
+      if (waiting_->IsRequested()) throw StoppedError();
       throw DatabaseError(what +
                           "it does not come to an end. The file is damaged: `sqlite3 FILE "
                           ".recover` may save its contents.");

@@ -70,8 +70,9 @@ class Connection {
   // then on it is taken to be the one that other programs may have locked.
   void AttachReadOnly(const std::filesystem::path& path, const std::string& schema);
 
-  // At which level of the stop request a wait for a lock ends; kFinishShards at first.
-  void GiveUpAt(StopRequest::Level level);
+  // From now on a wait for a lock goes on for some seconds after the first stop request, for what
+  // was computed is lost otherwise; the second one ends it.
+  void FinishWrites();
 
   // Whether there is another file at the path by now, or none.
   bool HasMoved();

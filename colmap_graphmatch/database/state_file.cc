@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/file_descriptor.h"
 #include "colmap_graphmatch/base/input_file.h"
 #include "colmap_graphmatch/database/lock_holder.h"
 
@@ -102,20 +103,32 @@ void EmptyAndLock(sqlite::Connection& connection) {
   LockAndExamine(connection);
 }
 
-// Gives the state file the owner and the rights of the database, as SQLite does with its files;
-// makes an empty one if there is none. What cannot be done shows when the file is opened.
+// The rights that a state file has at most: those of the database.
+mode_t RightsBeside(const struct stat& database) {
+  return (database.st_mode & 0666U) | S_IRUSR | S_IWUSR;
+}
+
+// Makes an empty state file with the owner and the rights of the database, as SQLite does with its
+// files, if there is nothing in its place. What cannot be done shows when it is opened.
+void MakeEmptyFile(const std::filesystem::path& database_path, const std::filesystem::path& path) {
+  struct stat database = {};
+  if (::stat(database_path.c_str(), &database) != 0) return;
+  const FileDescriptor made(
+      ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, RightsBeside(database)));
+  const bool is_given_away = made.Number() >= 0 && ::geteuid() == 0;
+  if (is_given_away && ::fchown(made.Number(), database.st_uid, database.st_gid) != 0) errno = 0;
+}
+
+// Takes from a state file the rights that the database does not give. (Not by a descriptor: to
+// close it would lose the lock.)
 void TakeRights(const std::filesystem::path& database_path, const std::filesystem::path& path) {
-  struct stat status = {};
-  if (::stat(database_path.c_str(), &status) != 0 || !WhyNotRegular(path).empty()) return;
-  const mode_t rights = (status.st_mode & 0666U) | S_IRUSR | S_IWUSR;
-  // One that is there is not opened: to close it would lose the lock of another connection.
-  const int made = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, rights);
-  if (made >= 0) ::close(made);
+  struct stat database = {};
   struct stat own = {};
-  if (::stat(path.c_str(), &own) != 0) return;
-  if ((own.st_mode & 0777U & ~rights) != 0) ::chmod(path.c_str(), own.st_mode & rights);
-  const bool is_given_away = made >= 0 && ::geteuid() == 0 && own.st_uid != status.st_uid;
-  if (is_given_away && ::chown(path.c_str(), status.st_uid, status.st_gid) != 0) errno = 0;
+  if (::stat(database_path.c_str(), &database) != 0 || ::lstat(path.c_str(), &own) != 0) return;
+  const mode_t rights = RightsBeside(database);
+  if (S_ISREG(own.st_mode) && (own.st_mode & 0777U & ~rights) != 0) {
+    ::chmod(path.c_str(), own.st_mode & rights);
+  }
 }
 
 }  // namespace
@@ -131,7 +144,9 @@ std::filesystem::path StateFile::PathFor(const std::filesystem::path& database_p
 StateFile::StateFile(const std::filesystem::path& database_path,
                      const sqlite::LockPatience& patience)
     : path_(PathFor(database_path)),
-      connection_((TakeRights(database_path, path_), Open(path_, patience))) {}
+      connection_((MakeEmptyFile(database_path, path_), Open(path_, patience))) {
+  TakeRights(database_path, path_);
+}
 
 sqlite::Connection StateFile::Open(const std::filesystem::path& path,
                                    const sqlite::LockPatience& patience) {
@@ -141,7 +156,10 @@ sqlite::Connection StateFile::Open(const std::filesystem::path& path,
                          "speeds up the next run. Move it, or delete it.");
   };
   const auto open = [&] {
-    if (!WhyNotRegular(path).empty()) throw something_else();
+    std::error_code ignored;
+    const bool leads_nowhere =
+        std::filesystem::is_symlink(path, ignored) && !std::filesystem::exists(path, ignored);
+    if (leads_nowhere || !WhyNotRegular(path).empty()) throw something_else();
     sqlite::Connection connection(path, sqlite::Access::kCreate, patience);
     // The lock stays when a transaction ends. What is lost in a crash is only worth the time to
     // compute it.

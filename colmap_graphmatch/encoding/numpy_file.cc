@@ -166,9 +166,6 @@ void WriteNamedVectors(const std::filesystem::path& path, const NamedVectors& ve
     throw FileError("Cannot write " + NamesPath(path).string() + ": the image name \"" + name +
                     "\" has a line end in it.");
   }
-  WriteWholeFile(NamesPath(path), [&](std::ostream& file) {
-    for (const std::string& name : vectors.names) file << name << '\n';
-  });
   WriteWholeFile(path, [&](std::ostream& file) {
     std::string text = "{'descr': '<f4', 'fortran_order': False, 'shape': (" +
                        std::to_string(vectors.names.size()) + ", " + std::to_string(vectors.dim) +
@@ -184,6 +181,9 @@ void WriteNamedVectors(const std::filesystem::path& path, const NamedVectors& ve
     file << text;
     file.write(reinterpret_cast<const char*>(vectors.rows.data()),
                static_cast<std::streamsize>(vectors.rows.size() * sizeof(float)));
+  });
+  WriteWholeFile(NamesPath(path), [&](std::ostream& file) {
+    for (const std::string& name : vectors.names) file << name << '\n';
   });
 }
 

@@ -23,7 +23,7 @@ std::filesystem::path NamesPath(std::filesystem::path path);
 // or are not as many as rows.
 NamedVectors ReadNamedVectors(const std::filesystem::path& path);
 
-// Writes both files (version 1, float32), the array last, each under another name first, so that
+// Writes both files (version 1, float32), the array first, each under another name first, so that
 // none is ever half written. Throws FileError.
 void WriteNamedVectors(const std::filesystem::path& path, const NamedVectors& vectors);
 

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "colmap_graphmatch/base/version.h"
@@ -16,6 +17,8 @@ namespace colmap_graphmatch {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr char kSchema[] = "graphmatch-report";
 
 Json Stage(const StageStatistics& stage) {
   return {{"tested", stage.num_tested},           {"edges", stage.num_edges},
@@ -203,7 +206,7 @@ std::string Dump(const Json& report) {
 std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult& result) {
   const GraphMatchResult& matching = result.matching;
   Json report;
-  report["schema"] = "graphmatch-report";
+  report["schema"] = kSchema;
   report["version"] = 1;
   report["program"] = std::string("graphmatch_matcher ") + kVersion;
   report["replay"] = result.replayed;
@@ -255,6 +258,16 @@ bool IsPage(const std::filesystem::path& report_path) {
 
 std::filesystem::path JsonReportPath(std::filesystem::path report_path) {
   return IsPage(report_path) ? report_path.replace_extension(".json") : report_path;
+}
+
+bool IsJsonReport(const std::filesystem::path& path) {
+  // The schema is its first member.
+  std::string beginning(64, '\0');
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  std::ifstream(path, std::ios::binary)
+      .read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  return beginning.find(kSchema) != std::string::npos;
 }
 
 }  // namespace colmap_graphmatch

@@ -17,4 +17,7 @@ bool IsPage(const std::filesystem::path& report_path);
 // Where the object goes: to the path, or if that is a page beside it, with .json instead.
 std::filesystem::path JsonReportPath(std::filesystem::path report_path);
 
+// Whether there is such an object in a file.
+bool IsJsonReport(const std::filesystem::path& path);
+
 }  // namespace colmap_graphmatch

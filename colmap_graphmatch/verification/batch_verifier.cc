@@ -219,7 +219,16 @@ bool BatchVerifier::Verify(const std::vector<ImagePair>& pairs,
   for (const ShardRunner::Shard& shard : shards) num_unanswered += shard.size();
   const auto merge = [&](const ShardPart& part) {
     CheckThatItWorks(part);
-    for (const VerifiedPair& verified : Write(part.results)) {
+    std::vector<VerifiedPair> written;
+    try {
+      written = Write(part.results);
+    } catch (const StoppedError&) {
+      on_warning_(
+          "Another program keeps the database locked: the last results could not be written and "
+          "are given up. The next run verifies these pairs again.");
+      throw;
+    }
+    for (const VerifiedPair& verified : written) {
       --num_unanswered;
       on_verified(verified);
     }

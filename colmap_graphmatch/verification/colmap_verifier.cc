@@ -189,8 +189,9 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<ShardPair>& pairs,
   const std::string last_lines = run.Succeeded() ? "" : LastLines(output_path, kNumLastLines);
   if (last_lines.find(std::strerror(EAGAIN)) != std::string::npos) {
     throw SystemLimitError(
-        "COLMAP could not start its threads, and " + run.Describe() +
-        ". The system lets this user or container have no more processes and threads: raise that "
+        "COLMAP " + run.Describe() +
+        ", perhaps since it could not start its threads. The system lets this user or container "
+        "have no more processes and threads: raise that "
         "limit (ulimit -u, Docker's --pids-limit), or use fewer with --SiftMatching.num_threads.");
   }
   if (!run.Succeeded()) {

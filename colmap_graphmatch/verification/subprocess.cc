@@ -33,7 +33,8 @@ constexpr std::chrono::milliseconds kRetryInterval(50);
 
 bool IsLimit(const std::error_code& error) {
   return error == std::errc::resource_unavailable_try_again ||
-         error == std::errc::not_enough_memory;
+         error == std::errc::not_enough_memory || error == std::errc::too_many_files_open ||
+         error == std::errc::too_many_files_open_in_system;
 }
 
 // Boost.Process does not say which file it could not open.
@@ -88,9 +89,9 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
                                const std::filesystem::path& output_path, double timeout_seconds,
                                const std::function<bool()>& should_stop) {
   bp::environment environment = boost::this_process::environment();
-  for (const char* variable : {"TMPDIR", "GLOG_log_dir"}) {
-    environment[variable] = output_path.parent_path().string();
-  }
+  const std::string directory = output_path.parent_path().string();
+  environment["TMPDIR"] = directory;
+  if (environment.count("GLOG_log_dir") == 0) environment["GLOG_log_dir"] = directory;
   Stopwatch elapsed;
   // Until exec, a child holds what others have just opened and not yet marked to be closed: one at
   // a time.
@@ -123,11 +124,16 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
     child = start();
   }
   lock.unlock();
+  if (error && should_stop()) {
+    SubprocessResult stopped;
+    stopped.ending = SubprocessResult::Ending::kStopped;
+    return stopped;
+  }
   if (IsLimit(error)) {
     throw SystemLimitError("Cannot start " + command.front() + ": " + error.message() +
                            ". The system lets this user or container have no more processes and "
-                           "threads: raise that limit (ulimit -u, Docker's --pids-limit), or use "
-                           "fewer with --SiftMatching.num_threads.");
+                           "threads, or open files: raise that limit (ulimit -u, ulimit -n, "
+                           "Docker's --pids-limit), or use fewer with --SiftMatching.num_threads.");
   }
   elapsed = Stopwatch();
   if (error) {
@@ -173,7 +179,10 @@ SubprocessResult RunTwice(const std::vector<std::string>& command,
   for (int i = 0; i < 2; ++i) {
     result = RunSubprocess(command, output_path, timeout_seconds, [&] { return stop.Requested(); });
     stop.ThrowIfRequested();
-    if (result.ending != SubprocessResult::Ending::kSignal) break;
+    // A shell that runs it ends with 128 and the signal.
+    const bool is_killed =
+        result.ending == SubprocessResult::Ending::kSignal || result.exit_code > 128;
+    if (!is_killed) break;
   }
   return result;
 }

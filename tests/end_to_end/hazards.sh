@@ -73,6 +73,9 @@ keeps vectors.txt 1 'are the same file' "$matcher" --database_path vectors.txt -
   --GraphMatching.export_vectors vectors.npy
 expect_exit 1 'are the same file' "${run[@]}" --GraphMatching.export_pairs w.txt --GraphMatching.export_vectors w.npy
 keeps images.txt 5 'It may be another file of yours' "${run[@]}" --GraphMatching.export_vectors images.npy
+# A report of its own is not another file.
+expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.report own.json
+expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.report own.html
 echo '{"mine": 1}' >run.json
 keeps run.json 5 'It may be another file of yours' "${run[@]}" --GraphMatching.report run.html
 expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_vectors v.npy --GraphMatching.report r.html
@@ -105,6 +108,11 @@ expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_pairs pairs --Gr
 wait
 [[ -L pairs && -p pipe && -c /dev/null ]] || fail 'a link, a pipe or a device was replaced'
 [[ $(head -n 1 received) == test,* && $(wc -l <elsewhere/pairs) -gt 10 ]] || fail 'not what was to be written'
+expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_pairs /dev/stdout
+"${run[@]}" --GraphMatching.test_log /dev/stdout --GraphMatching.export_pairs /dev/stdout --GraphMatching.max_pairs 5 \
+  --GraphMatching.strategy exhaustive >both 2>"$work/output.txt"
+"${run[@]}" --GraphMatching.export_pairs /dev/stdout >>both 2>"$work/output.txt" || fail 'a file as the standard output'
+[[ $(head -n 1 both) == test,* && $(grep -c '^Images ' both) == 2 ]] || fail 'what was printed was written over'
 expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_pairs /dev/stdout
 grep -q -x $'place0/photo [0-9]*.jpg\tplace0/photo [0-9]*.jpg' "$work/output.txt" || fail 'no list on the standard output'
 expect_exit 5 'no program reads from this pipe' timeout 60 "${run[@]}" --GraphMatching.export_pairs pipe
@@ -259,6 +267,23 @@ pkill -P "$holder" sleep || true
 wait
 check_integrity database.db
 expect_exit 0 'more were known' "${run[@]}"
+# One signal is enough: what cannot be written soon is given up, and said to be.
+fresh big
+sqlite3 database.db 'PRAGMA journal_mode = DELETE' >/dev/null
+FAKE_COLMAP_DELAY_MS=20 "${run[@]}" --GraphMatching.lock_timeout 25 >"$work/output.txt" 2>&1 &
+pid=$!
+while (($(sqlite3 database.db '.timeout 5000' 'SELECT count(*) FROM two_view_geometries') == 0)); do sleep 0.05; done
+hold database.db
+sleep 1
+SECONDS=0
+kill -INT "$pid"
+code=0
+wait "$pid" || code=$?
+[[ $code == 130 ]] || { cat "$work/output.txt"; fail "one signal while it writes: exit code $code"; }
+((SECONDS < 10)) || fail "it took $SECONDS s"
+pkill -P "$holder" sleep || true
+wait
+check_integrity database.db
 # Before anything is computed.
 fresh small
 FAKE_COLMAP_HELP_DELAY_MS=20000 "${run[@]}" >"$work/output.txt" 2>&1 &
@@ -311,6 +336,8 @@ check_integrity database.db
 expect_exit 0 'Pairs tested' "${run[@]}"
 fresh small
 expect_exit 0 'The log /dev/full cannot be written any more: No space left on device' "${run[@]}" --log_path /dev/full
+fresh small
+expect_exit 0 'The log /dev/full cannot be written any more' "${run[@]}" --log_path /dev/full --log_to_stderr 0
 fresh small
 expect_exit 0 '' bash -c '"$@" >&-' bash "${run[@]}" --log_path log.txt
 ! grep -q 'Pairs tested' log.txt || fail 'the summary went into the log'
