@@ -512,12 +512,6 @@ void Table::AddEvaluation() {
       "a finished matching graph that answers instead of COLMAP, to compare options in seconds: a "
       "matched COLMAP database, or lines of two images and their inliers, separated by tabs. "
       "Nothing is written to the database");
-  Add("GraphMatching.replay_matching_cost",
-      DoubleOf(&p.replay_costs.seconds_per_million_products, Zero::kAllowed),
-      "seconds (>= 0) of one core that a replay counts for a million products of descriptors");
-  Add("GraphMatching.replay_verification_cost",
-      DoubleOf(&p.replay_costs.seconds_per_verification, Zero::kAllowed),
-      "seconds (>= 0) of one core that it counts for a pair with enough matches to be verified");
 }
 
 void Table::AddLog() {

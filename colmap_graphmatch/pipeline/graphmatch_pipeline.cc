@@ -330,7 +330,7 @@ ReplayVerifier MakeReplayVerifier(const Job& job) {
   std::unordered_map<ImageId, std::size_t> num_features;
   for (const ImageRecord& image : job.images) num_features[image.id] = image.num_features;
   verifier.SetStop(&job.stop);
-  verifier.SetCosts(options.replay_costs, std::move(num_features), job.threads.NumThreads());
+  verifier.SetCosts(std::move(num_features), job.threads.NumThreads());
   return verifier;
 }
 
