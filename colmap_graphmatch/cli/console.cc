@@ -84,9 +84,6 @@ std::string FormatVerification(const VerifierStatistics& statistics) {
                     static_cast<double>(statistics.num_image_reads) /
                         static_cast<double>(statistics.num_matched));
   }
-  if (statistics.num_preempted > 0) {
-    text += fmt::format("Given up early     {} pairs\n", statistics.num_preempted);
-  }
   const double both = statistics.matching_seconds + statistics.colmap_seconds;
   if (both > 0) {
     text += fmt::format(

@@ -467,11 +467,6 @@ void Table::AddMatching() {
   Add("GraphMatching.cache_gb", DoubleOf(&exact.cache_gb, Zero::kAllowed),
       "GB (>= 0) of descriptors kept in memory; 0: a quarter of the memory. Less reads images more "
       "often");
-  Add("GraphMatching.preemptive_num_features", IntOf(&exact.preemptive_num_features, 0),
-      "features (>= 1) of the largest scales that are matched first, to give up pairs with few "
-      "matches early, which loses edges; 0: match all at once");
-  Add("GraphMatching.preemptive_min_matches", IntOf(&exact.preemptive_min_matches, 1),
-      "matches (>= 1) of those that a pair needs, or else it counts as tested, without an edge");
 }
 
 void Table::AddWork() {

@@ -70,8 +70,7 @@ struct VerifierStatistics {
   double colmap_seconds = 0;
 
   std::size_t num_matched = 0;    // Pairs whose descriptors were matched here,
-  std::size_t num_preempted = 0;  // those of them given up after the features of largest scale,
-  std::size_t num_unmatched = 0;  // and those with fewer matches than an edge needs inliers.
+  std::size_t num_unmatched = 0;  // those of them with fewer matches than an edge needs inliers.
   std::size_t num_verified = 0;   // Pairs that COLMAP verified,
   std::size_t num_failed = 0;     // and those on which it failed.
   std::size_t num_image_reads = 0;

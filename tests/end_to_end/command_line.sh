@@ -201,12 +201,8 @@ expect_pairs 180
 expect_pairs 0 --SiftMatching.max_distance 0.001
 expect_pairs 0 --SiftMatching.max_ratio 0.01
 expect_pairs 0 --FeatureMatching.max_num_matches 5
-expect_pairs 0 --GraphMatching.preemptive_num_features 3 --GraphMatching.preemptive_min_matches 3 \
-  --SiftMatching.max_ratio 0.01
 # Without the cross check and without limits every feature matches, in all pairs.
 expect_pairs 780 --SiftMatching.cross_check 0 --SiftMatching.max_ratio 10 --SiftMatching.max_distance 4
-expect_exit 1 'no pair could pass' "${run[@]}" --GraphMatching.preemptive_num_features 3 \
-  --GraphMatching.preemptive_min_matches 4
 
 echo "== All pairs, and those of a list"
 cp "$work/untouched.db" "$work/exhaustive.db"
