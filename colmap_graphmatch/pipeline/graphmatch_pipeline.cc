@@ -46,11 +46,8 @@ std::string LoopKey(const PipelineOptions& options, const GraphMatchOptions& gra
   std::string key = "loop";
   for (const int value :
        {graph.number_sample_iterations, graph.max_num_neighbors, graph.num_to_propagate,
-        graph.max_tests_for_sampling, static_cast<int>(graph.sampling_schedule),
-        graph.count_incoming_tests ? 1 : 0, graph.sample_untested_only ? 1 : 0,
-        static_cast<int>(graph.propagation_distance), graph.propagate_untested_only ? 1 : 0,
-        graph.propagate_from_new_edges_only ? 1 : 0, graph.stop_sampling_without_edges ? 1 : 0,
-        graph.max_failed_samples, options.verification.min_num_inliers}) {
+        graph.max_tests_for_sampling, graph.max_failed_samples,
+        options.verification.min_num_inliers}) {
     key += " " + std::to_string(value);
   }
   return key + ", restrictions " + std::to_string(restrictions.checksum());

@@ -31,10 +31,6 @@ struct SelectedDescriptors {
       : num(rows.size()), data(all.CopyRows(rows)) {}
 };
 
-Random ImageRandom(const ImageVectorOptions& options, RandomStage stage, ImageId image_id) {
-  return Random({options.seed, static_cast<std::uint64_t>(stage), image_id});
-}
-
 // On a thread of its own, or, if the system gives none, when it is asked for.
 template <typename Function>
 auto Start(Function function) -> std::future<decltype(function())> {
@@ -116,10 +112,10 @@ VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database
       images, threads, stop,
       [&](const ImageRecord& image) {
         const Descriptors descriptors = database.ReadDescriptors(image);
-        return SelectedDescriptors(
-            descriptors,
-            SelectRandom(descriptors.num_rows, per_image,
-                         ImageRandom(options, RandomStage::kTrainingSample, image.id)));
+        const Random random(
+            {options.seed, static_cast<std::uint64_t>(RandomStage::kTrainingSample), image.id});
+        return SelectedDescriptors(descriptors,
+                                   SelectRandom(descriptors.num_rows, per_image, random));
       },
       [&](std::size_t i, const SelectedDescriptors& selected) {
         samples.middleRows(first_rows[i], first_rows[i + 1] - first_rows[i]) =
@@ -170,12 +166,6 @@ std::vector<float> EncodeImages(const ImageVectorOptions& options, const VectorM
   const auto max_num_features = static_cast<std::size_t>(options.max_num_features);
   const auto select = [&](const ImageRecord& image) {
     const Descriptors descriptors = database.ReadDescriptors(image);
-    if (options.feature_selection == ImageVectorOptions::FeatureSelection::kRandom) {
-      return SelectedDescriptors(
-          descriptors,
-          SelectRandom(descriptors.num_rows, max_num_features,
-                       ImageRandom(options, RandomStage::kFeatureSelection, image.id)));
-    }
     const std::vector<float> scales = database.ReadKeypoints(image.id).Scales(descriptors.num_rows);
     return SelectedDescriptors(descriptors, SelectLargestScales(scales, max_num_features));
   };

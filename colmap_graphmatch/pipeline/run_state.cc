@@ -81,8 +81,7 @@ void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFinger
                  ", iterations " + std::to_string(gmm.max_num_iterations) + ", variance floor " +
                  Hex(gmm.variance_floor) + ", training " +
                  std::to_string(options.num_training_descriptors) + ", features " +
-                 std::to_string(options.max_num_features) + ", selection " +
-                 std::to_string(static_cast<int>(options.feature_selection)) + ", seed " +
+                 std::to_string(options.max_num_features) + ", seed " +
                  std::to_string(options.seed) + " " + std::to_string(gmm.seed);
 }
 

@@ -21,7 +21,6 @@ expect_exit 1 'Did you mean --SiftMatching.max_ratio?' "${run[@]}" --SiftMatchin
 expect_exit 1 'Did you mean --TwoViewGeometry.min_num_inliers?' "${run[@]}" --Mapper.min_num_inlier 20
 expect_exit 1 '--GraphMatching.max_num_neighbors is "0"; it must be an integer of at least 1' \
   "${run[@]}" --GraphMatching.max_num_neighbors 0
-expect_exit 1 'must be one of carry, floor, round' "${run[@]}" --GraphMatching.sampling_schedule x
 expect_exit 1 '--SiftMatching.max_ratio is "zero"; it must be a number greater than 0' \
   "${run[@]}" --SiftMatching.max_ratio zero
 expect_exit 1 'the same option with different values' "${run[@]}" --SiftMatching.max_error 4 \
