@@ -133,6 +133,37 @@ TEST(Options, IterationsShareTheBudgetRoundedDown) {
   EXPECT_EQ(options.TestsInIteration(0, 1000), 1);
 }
 
+TEST(Options, EveryFieldChangesTheKey) {
+  std::set<std::string> keys = {GraphMatchOptions().Key()};
+  const std::vector<void (*)(GraphMatchOptions*)> changes = {
+      [](GraphMatchOptions* o) { o->number_sample_iterations = 1; },
+      [](GraphMatchOptions* o) { o->max_num_neighbors = 1; },
+      [](GraphMatchOptions* o) { o->num_to_propagate = 1; },
+      [](GraphMatchOptions* o) { o->max_tests_for_sampling = 1; },
+      [](GraphMatchOptions* o) { o->max_failed_samples = 1; },
+      [](GraphMatchOptions* o) {
+        o->restrictions.seeking = {true, false};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.seeking = {true, true};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.seeking = {true, true, true};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.frames = {0, 1};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.frames = {1, 1};
+      }};
+  for (const auto& change : changes) {
+    GraphMatchOptions options;
+    change(&options);
+    EXPECT_TRUE(keys.insert(options.Key()).second) << options.Key();
+    EXPECT_EQ(options.Key(), GraphMatchOptions(options).Key());
+  }
+}
+
 TEST(Options, RejectsWhatCannotBe) {
   for (const auto& break_option : std::vector<void (*)(GraphMatchOptions*)>{
            [](GraphMatchOptions* o) { o->number_sample_iterations = -1; },

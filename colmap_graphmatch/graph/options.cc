@@ -27,6 +27,14 @@ int GraphMatchOptions::TestsInIteration(int iteration, std::size_t num_images) c
   return std::max(1, MaxTestsForSampling(num_images) / number_sample_iterations);
 }
 
+std::string GraphMatchOptions::Key() const {
+  // Does not compile if a field is forgotten.
+  const auto& [iterations, neighbors, propagated, tests, failed, pairs] = *this;
+  return "iterations " + std::to_string(iterations) + ", neighbors " + std::to_string(neighbors) +
+         ", propagated " + std::to_string(propagated) + ", tests " + std::to_string(tests) +
+         ", failed " + std::to_string(failed) + ", " + pairs.Key();
+}
+
 void GraphMatchOptions::Check() const {
   CheckAtLeast("number_sample_iterations", number_sample_iterations, 0);
   CheckAtLeast("max_num_neighbors", max_num_neighbors, 1);

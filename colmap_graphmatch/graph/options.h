@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include "colmap_graphmatch/graph/pair_restrictions.h"
 
@@ -37,6 +38,9 @@ struct GraphMatchOptions {
   // The number of tests an image may draw in each iteration (counted from 0) that samples:
   // floor(MaxTestsForSampling / number_sample_iterations), at least 1 as long as the budget lasts.
   int TestsInIteration(int iteration, std::size_t num_images) const;
+
+  // Names the values of all fields: equal for equal options alone.
+  std::string Key() const;
 
   // Throws OptionsError.
   void Check() const;

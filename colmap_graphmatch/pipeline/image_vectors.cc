@@ -94,6 +94,15 @@ void ImageVectorOptions::Check() const {
   }
 }
 
+std::string ImageVectorOptions::Key() const {
+  // Does not compile if a field is forgotten.
+  const auto& [described_by, photos, vectors, dim, mixture, num_training, num_features, own_seed] =
+      *this;
+  return "descriptor " + std::to_string(static_cast<int>(described_by)) + ", PCA " +
+         std::to_string(dim) + ", " + mixture.Key() + ", training " + std::to_string(num_training) +
+         ", features " + std::to_string(num_features) + ", seed " + std::to_string(own_seed);
+}
+
 VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database& database,
                                      const std::vector<ImageRecord>& images, ThreadPool& threads,
                                      const StopRequest& stop) {

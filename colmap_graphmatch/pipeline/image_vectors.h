@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/base/stop_request.h"
@@ -41,6 +42,9 @@ struct ImageVectorOptions {
   int max_num_features = 1000;
 
   std::uint64_t seed = 0;
+
+  // Names the values of all fields but the paths: their contents count, not where they are.
+  std::string Key() const;
 
   // Throws OptionsError.
   void Check() const;
