@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -624,6 +625,22 @@ TEST(GmmOptionsTest, InvalidOptionsAreRefused) {
   GmmOptions options;
   options.variance_floor = 0;
   expect_refused(options);
+}
+
+TEST(GmmOptionsTest, EveryFieldChangesTheKey) {
+  std::set<std::string> keys = {GmmOptions().Key()};
+  const std::vector<void (*)(GmmOptions*)> changes = {
+      [](GmmOptions* o) { o->num_components = 16; },
+      [](GmmOptions* o) { o->tolerance = std::nextafter(o->tolerance, 1); },
+      [](GmmOptions* o) { o->max_num_iterations = 16; },
+      [](GmmOptions* o) { o->variance_floor = std::nextafter(o->variance_floor, 1); },
+      [](GmmOptions* o) { o->seed = 16; }};
+  for (const auto& change : changes) {
+    GmmOptions options;
+    change(&options);
+    EXPECT_TRUE(keys.insert(options.Key()).second) << options.Key();
+    EXPECT_EQ(options.Key(), GmmOptions(options).Key());
+  }
 }
 
 TEST(GmmOptionsTest, NoSamplesAreRefused) {

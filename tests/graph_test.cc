@@ -124,23 +124,44 @@ TEST(Options, FormulaOfThePaperForMaxTestsForSampling) {
   EXPECT_EQ(options.TestsInIteration(10, 1497), 0);
 }
 
-TEST(Options, SchedulesSpreadTheBudget) {
+TEST(Options, IterationsShareTheBudgetRoundedDown) {
   GraphMatchOptions options;
   options.max_tests_for_sampling = 27;
-  const auto total = [&options] {
-    int sum = 0;
-    for (int i = 0; i < options.number_sample_iterations; ++i) {
-      sum += options.TestsInIteration(i, 1000);
-    }
-    return sum;
-  };
-  EXPECT_EQ(total(), 20);
-  options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kRound;
-  EXPECT_EQ(total(), 30);
-  options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kCarry;
-  EXPECT_EQ(total(), 27);
+  EXPECT_EQ(options.TestsInIteration(0, 1000), 2);
+  EXPECT_EQ(options.TestsInIteration(9, 1000), 2);
   options.max_tests_for_sampling = 3;
-  EXPECT_EQ(total(), 3);
+  EXPECT_EQ(options.TestsInIteration(0, 1000), 1);
+}
+
+TEST(Options, EveryFieldChangesTheKey) {
+  std::set<std::string> keys = {GraphMatchOptions().Key()};
+  const std::vector<void (*)(GraphMatchOptions*)> changes = {
+      [](GraphMatchOptions* o) { o->number_sample_iterations = 1; },
+      [](GraphMatchOptions* o) { o->max_num_neighbors = 1; },
+      [](GraphMatchOptions* o) { o->num_to_propagate = 1; },
+      [](GraphMatchOptions* o) { o->max_tests_for_sampling = 1; },
+      [](GraphMatchOptions* o) { o->max_failed_samples = 1; },
+      [](GraphMatchOptions* o) {
+        o->restrictions.seeking = {true, false};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.seeking = {true, true};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.seeking = {true, true, true};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.frames = {0, 1};
+      },
+      [](GraphMatchOptions* o) {
+        o->restrictions.frames = {1, 1};
+      }};
+  for (const auto& change : changes) {
+    GraphMatchOptions options;
+    change(&options);
+    EXPECT_TRUE(keys.insert(options.Key()).second) << options.Key();
+    EXPECT_EQ(options.Key(), GraphMatchOptions(options).Key());
+  }
 }
 
 TEST(Options, RejectsWhatCannotBe) {
@@ -256,10 +277,10 @@ TEST(Propagation, ClosesTriangles) {
   ThreadPool threads(1);
   MatchingGraph graph(5);
   graph.Add({{{0, 1}, true}, {{1, 2}, true}, {{2, 3}, false}});
-  EXPECT_THAT(Propagate(GraphMatchOptions(), ranking, graph, 0, threads),
+  EXPECT_THAT(Propagate(GraphMatchOptions(), ranking, graph, threads),
               ElementsAre(VertexPair(0, 2)));
   graph.Add({{{0, 2}, false}});
-  EXPECT_THAT(Propagate(GraphMatchOptions(), ranking, graph, 0, threads), IsEmpty());
+  EXPECT_THAT(Propagate(GraphMatchOptions(), ranking, graph, threads), IsEmpty());
 }
 
 TEST(Propagation, HandsOnTheNearestOnly) {
@@ -273,7 +294,7 @@ TEST(Propagation, HandsOnTheNearestOnly) {
   GraphMatchOptions options;
   options.num_to_propagate = 2;
   std::set<Vertex> of_zero;
-  for (const auto& [a, b] : Propagate(options, ranking, graph, 0, threads)) {
+  for (const auto& [a, b] : Propagate(options, ranking, graph, threads)) {
     if (a == 0) of_zero.insert(b);
   }
   // 2 and 3 look most like 0; and 0 is the farthest for all others but 2 and 3, which have nearer
@@ -289,9 +310,9 @@ TEST(Propagation, FullVerticesAreReachedFromOthersOnly) {
   MatchingGraph graph(4);
   graph.Add({{{0, 1}, true}, {{1, 2}, true}});
   // All of 0, 1, 2 have a neighbour.
-  EXPECT_THAT(Propagate(options, ranking, graph, 0, threads), IsEmpty());
+  EXPECT_THAT(Propagate(options, ranking, graph, threads), IsEmpty());
   options.max_num_neighbors = 2;
-  EXPECT_THAT(Propagate(options, ranking, graph, 0, threads), ElementsAre(VertexPair(0, 2)));
+  EXPECT_THAT(Propagate(options, ranking, graph, threads), ElementsAre(VertexPair(0, 2)));
 }
 
 TEST(Propagation, CountsWhatItCouldProposeWithoutALimit) {
@@ -312,7 +333,7 @@ TEST(Propagation, CountsWhatItCouldProposeWithoutALimit) {
   }
   for (const int max_num_neighbors : {6, 120}) {
     options.max_num_neighbors = max_num_neighbors;
-    const std::vector<VertexPair> open = Propagate(options, ranking, graph, 0, threads);
+    const std::vector<VertexPair> open = Propagate(options, ranking, graph, threads);
     EXPECT_GT(open.size(), 20U);
     EXPECT_EQ(CountOpenPairs(options, graph, threads), open.size());
   }
@@ -330,41 +351,12 @@ std::vector<NamedOptions> AllChoices() {
     change(choices.back().options);
   };
   using O = GraphMatchOptions;
-  add("Round", [](O& o) {
-    o.sampling_schedule = O::SamplingSchedule::kRound;
-    o.max_tests_for_sampling = 17;
-  });
-  add("Carry", [](O& o) {
-    o.sampling_schedule = O::SamplingSchedule::kCarry;
-    o.max_tests_for_sampling = 17;
-  });
-  add("CarryLittle", [](O& o) {
-    o.sampling_schedule = O::SamplingSchedule::kCarry;
-    o.max_tests_for_sampling = 3;
-  });
-  add("CountIncoming", [](O& o) { o.count_incoming_tests = true; });
-  add("RankByNeighbor", [](O& o) {
-    o.propagation_distance = O::PropagationDistance::kNeighbor;
-    o.num_to_propagate = 1;
-  });
-  add("DropTestedLate", [](O& o) { o.propagate_untested_only = false; });
-  add("GoOnInTheList", [](O& o) { o.sample_untested_only = false; });
-  add("GoOnInTheListCountingIncomingTests", [](O& o) {
-    o.sample_untested_only = false;
-    o.count_incoming_tests = true;
-  });
-  add("NewEdgesOnly", [](O& o) {
-    o.propagate_from_new_edges_only = true;
-    o.num_to_propagate = 1;
-  });
-  add("StopSampling", [](O& o) { o.stop_sampling_without_edges = true; });
+  add("BudgetThatIsNoMultiple", [](O& o) { o.max_tests_for_sampling = 17; });
+  add("FewerTestsThanIterations", [](O& o) { o.max_tests_for_sampling = 3; });
+  add("PropagateOne", [](O& o) { o.num_to_propagate = 1; });
   add("FailedSamples", [](O& o) {
     o.max_failed_samples = 2;
     o.max_tests_for_sampling = 20;
-  });
-  add("FailedSamplesInList", [](O& o) {
-    o.max_failed_samples = 3;
-    o.sample_untested_only = false;
   });
   add("FewNeighbors", [](O& o) { o.max_num_neighbors = 3; });
   add("NoSampling", [](O& o) { o.number_sample_iterations = 0; });
@@ -494,31 +486,18 @@ TEST(Loop, TerminatesWithoutAnyEdge) {
 }
 
 // Lists and budgets end long before the iterations do.
-TEST(Loop, ManyIterationsWithNothingToSampleAreSkipped) {
+TEST(Loop, EndsWhenNothingIsLeftToSampleThoughIterationsAre) {
   const Scene scene = MakeScene(4, 10, 4, 0.5, 4);
   const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
   GraphMatchOptions options;
   options.number_sample_iterations = 1000000000;
   for (const int budget : {10, 1000000000}) {
     options.max_tests_for_sampling = budget;
-    options.sample_untested_only = false;
-    options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kFloor;
-    RecordingVerifier in_list(edges);
-    const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &in_list);
+    RecordingVerifier verifier(edges);
+    const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &verifier);
     EXPECT_LE(result.iterations.size(), 40U);
-    EXPECT_EQ(result.graph.NumTested(), in_list.tested.size());
+    EXPECT_EQ(result.graph.NumTested(), verifier.tested.size());
   }
-  options.number_sample_iterations = 1000000;
-  options.max_tests_for_sampling = 5;
-  options.sample_untested_only = true;
-  options.sampling_schedule = GraphMatchOptions::SamplingSchedule::kCarry;
-  RecordingVerifier carried(edges);
-  const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &carried);
-  // One draw of each in every 200,000th iteration, the fifth in the last one.
-  int last = 0;
-  for (const IterationStatistics& iteration : result.iterations) last = iteration.iteration;
-  EXPECT_GE(last, 999999);
-  EXPECT_LE(result.iterations.size(), 50U);
 }
 
 TEST(Loop, GivesUpSamplingOfAnImageThatHasANeighbour) {

@@ -291,7 +291,7 @@ TEST(DescriptorCache, ReadsEachImageOnceIfThereIsRoom) {
   for (int round = 0; round < 3; ++round) {
     for (ImageId image = 1; image <= 20; ++image) {
       const auto handle = cache.Request(image);
-      EXPECT_EQ(cache.Wait(handle).All().num, image);
+      EXPECT_EQ(cache.Wait(handle).View().num, image);
       EXPECT_THAT(cache.Wait(handle).descriptors, Each(image));
     }
   }
@@ -320,7 +320,7 @@ TEST(DescriptorCache, WhatIsHeldStaysThoughTheCacheHasNoRoom) {
   DescriptorCache cache(0, 2, [] { return FeaturesOf; });
   std::vector<std::pair<ImageId, DescriptorCache::Handle>> handles;
   for (ImageId image = 1; image <= 50; ++image) handles.emplace_back(image, cache.Request(image));
-  for (const auto& [image, handle] : handles) EXPECT_EQ(cache.Wait(handle).All().num, image);
+  for (const auto& [image, handle] : handles) EXPECT_EQ(cache.Wait(handle).View().num, image);
   EXPECT_EQ(cache.MaxBytesKept(), 0U);
 }
 
@@ -334,8 +334,8 @@ TEST(DescriptorCache, AnErrorIsThrownToWhoeverWaitsAndTriedAgain) {
   });
   const auto first = cache.Request(7);
   EXPECT_THROW(cache.Wait(first), std::runtime_error);
-  EXPECT_EQ(cache.Wait(cache.Request(7)).All().num, 7U);
-  EXPECT_EQ(cache.Wait(cache.Request(3)).All().num, 3U);
+  EXPECT_EQ(cache.Wait(cache.Request(7)).View().num, 7U);
+  EXPECT_EQ(cache.Wait(cache.Request(3)).View().num, 3U);
 }
 
 TEST(DescriptorCache, WithoutAThreadWhoeverWaitsReads) {
@@ -347,7 +347,7 @@ TEST(DescriptorCache, WithoutAThreadWhoeverWaitsReads) {
   for (int t = 0; t < 3; ++t) {
     threads.emplace_back([&] {
       for (std::size_t i = handles.size(); i-- > 0;) {
-        wrong += cache.Wait(handles[i]).All().num == i + 1 ? 0 : 1;
+        wrong += cache.Wait(handles[i]).View().num == i + 1 ? 0 : 1;
       }
     });
   }
@@ -372,7 +372,7 @@ TEST(DescriptorCache, ManyThreads) {
       for (int i = 0; i < 2000; ++i) {
         const auto image = static_cast<ImageId>(1 + random.Index(30));
         const auto handle = cache.Request(image);
-        if (cache.Wait(handle).All().num != image) ++wrong;
+        if (cache.Wait(handle).View().num != image) ++wrong;
       }
     });
   }

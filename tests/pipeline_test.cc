@@ -5,6 +5,7 @@
 #include <chrono>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -131,6 +132,27 @@ TEST(PipelineOptions, OptionsThatWouldHaveNoEffect) {
     o.ranking.ranking_path = "lists.tsv";
     o.ranking.vectors.descriptor = ImageVectorOptions::Descriptor::kVlad;
   }));
+}
+
+TEST(ImageVectorOptions, EveryFieldButThePathsChangesTheKey) {
+  std::set<std::string> keys = {ImageVectorOptions().Key()};
+  const std::vector<void (*)(ImageVectorOptions*)> changes = {
+      [](ImageVectorOptions* o) { o->descriptor = ImageVectorOptions::Descriptor::kVlad; },
+      [](ImageVectorOptions* o) { o->pca_dim = 1; },
+      [](ImageVectorOptions* o) { o->gmm.num_components = 1; },
+      [](ImageVectorOptions* o) { o->num_training_descriptors = 1; },
+      [](ImageVectorOptions* o) { o->max_num_features = 1; },
+      [](ImageVectorOptions* o) { o->seed = 1; }};
+  for (const auto& change : changes) {
+    ImageVectorOptions options;
+    change(&options);
+    EXPECT_TRUE(keys.insert(options.Key()).second) << options.Key();
+    EXPECT_EQ(options.Key(), ImageVectorOptions(options).Key());
+  }
+  ImageVectorOptions elsewhere;
+  elsewhere.image_path = "photos";
+  elsewhere.vectors_path = "vectors.npy";
+  EXPECT_EQ(elsewhere.Key(), ImageVectorOptions().Key());
 }
 
 TEST(RunState, OneOfNothingKeepsNothing) {

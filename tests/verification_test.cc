@@ -340,7 +340,6 @@ TEST_F(ExactMatcherTest, ColmapOnlyGetsPairsWithEnoughMatches) {
   EXPECT_THAT(Log(), Contains("given 1 2: 30"));
   EXPECT_EQ(statistics_.num_matched, 300U);
   EXPECT_EQ(statistics_.num_unmatched, 250U);
-  EXPECT_EQ(statistics_.num_preempted, 0U);
   EXPECT_EQ(statistics_.num_image_reads, 25U);
 }
 
@@ -379,15 +378,6 @@ TEST_F(ExactMatcherTest, MatchingFollowsTheOptions) {
   EXPECT_TRUE(Verify(AllPairs(25)));
   EXPECT_EQ(CountInLog("pair"), 0U);
   EXPECT_EQ(statistics_.num_unmatched, 300U);
-}
-
-TEST_F(ExactMatcherTest, PairsWithTooFewMatchesOfTheLargestScalesAreGivenUp) {
-  options_.exact.preemptive_num_features = 10;
-  options_.exact.preemptive_min_matches = 1;
-  EXPECT_TRUE(Verify(AllPairs(25)));
-  EXPECT_EQ(statistics_.num_matched, 300U);
-  EXPECT_EQ(statistics_.num_preempted, 250U);
-  EXPECT_EQ(CountInLog("pair"), 50U);
 }
 
 TEST_F(ExactMatcherTest, MatchesThatAwaitVerificationAreVerifiedAsTheyAre) {
@@ -496,14 +486,6 @@ TEST_F(ExactMatcherTest, WrongOptions) {
   options_.exact.cache_gb = -1;
   EXPECT_THROW(options_.Check(), OptionsError);
   options_.exact.cache_gb = 0;
-  options_.exact.preemptive_num_features = -1;
-  EXPECT_THROW(options_.Check(), OptionsError);
-  options_.exact.preemptive_num_features = 100;
-  options_.exact.preemptive_min_matches = 0;
-  EXPECT_THROW(options_.Check(), OptionsError);
-  options_.exact.preemptive_min_matches = 101;  // No pair could have as many.
-  EXPECT_THROW(options_.Check(), OptionsError);
-  options_.exact.preemptive_min_matches = 100;
   options_.exact.cache_gb = 1e300;
   options_.Check();
   options_.exact.cache_gb = std::numeric_limits<double>::infinity();

@@ -42,7 +42,6 @@ class Random {
 enum class RandomStage : std::uint64_t {
   kTrainingSample = 1,
   kKMeans = 2,
-  kFeatureSelection = 3,
 };
 
 }  // namespace colmap_graphmatch

@@ -85,9 +85,6 @@ std::string FormatVerification(const PipelineResult& result) {
         matching.num_matched, FormatDuration(matching.seconds),
         static_cast<double>(matching.num_image_reads) / static_cast<double>(matching.num_matched));
   }
-  if (matching.num_preempted > 0) {
-    text += fmt::format("Given up early     {} pairs\n", matching.num_preempted);
-  }
   const double both = matching.seconds + colmap.seconds;
   if (both > 0) {
     text += fmt::format(

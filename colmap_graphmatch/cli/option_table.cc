@@ -24,13 +24,6 @@ using Use = OptionRow::Use;
 template <typename Enum>
 using Names = std::map<std::string, Enum>;
 
-const Names<GraphMatchOptions::SamplingSchedule> kSchedules = {
-    {"floor", GraphMatchOptions::SamplingSchedule::kFloor},
-    {"round", GraphMatchOptions::SamplingSchedule::kRound},
-    {"carry", GraphMatchOptions::SamplingSchedule::kCarry}};
-const Names<GraphMatchOptions::PropagationDistance> kDistances = {
-    {"source", GraphMatchOptions::PropagationDistance::kSource},
-    {"neighbor", GraphMatchOptions::PropagationDistance::kNeighbor}};
 const Names<PipelineOptions::Strategy> kStrategies = {
     {"graphmatch", PipelineOptions::Strategy::kGraphMatch},
     {"sampling", PipelineOptions::Strategy::kSampling},
@@ -52,10 +45,6 @@ const Names<LogOptions::Target> kLogTargets = {
     {"stdout", LogOptions::Target::kStdout},
     {"file", LogOptions::Target::kFile},
     {"stderr_and_file", LogOptions::Target::kStderrAndFile}};
-const Names<ImageVectorOptions::FeatureSelection> kSelections = {
-    {"largest", ImageVectorOptions::FeatureSelection::kLargestScales},
-    {"random", ImageVectorOptions::FeatureSelection::kRandom}};
-
 constexpr std::array<const char*, 3> kMatchingGroups = {"SiftMatching.", "TwoViewGeometry.",
                                                         "FeatureMatching."};
 
@@ -407,21 +396,6 @@ void Table::AddGraph() {
       "images (>= 1) that retrieval and briad test each image with; 0: 120, and 40 for briad");
   Add("GraphMatching.num_expansions", IntOf(&p.num_expansions, 0),
       "rounds (>= 0) of query expansion by briad");
-  Add("GraphMatching.sampling_schedule", OneOf(&p.graph.sampling_schedule, kSchedules),
-      "tests an iteration: budget / iterations as floor, round, or carry (spends it all)");
-  Add("GraphMatching.sample_untested_only", BoolOf(&p.graph.sample_untested_only),
-      "draw the nearest untested images; 0: go on in the ranked list, and drop the tested");
-  Add("GraphMatching.count_incoming_tests", BoolOf(&p.graph.count_incoming_tests),
-      "tests drawn by other images count against an image's budget, too");
-  Add("GraphMatching.propagation_distance", OneOf(&p.graph.propagation_distance, kDistances),
-      "rank a neighbour's neighbours by their distance to the image itself (source) or to the "
-      "neighbor");
-  Add("GraphMatching.propagate_untested_only", BoolOf(&p.graph.propagate_untested_only),
-      "take the best among the untested; 0: among all, then drop the tested");
-  Add("GraphMatching.propagate_from_new_edges_only", BoolOf(&p.graph.propagate_from_new_edges_only),
-      "propagate along each edge only once");
-  Add("GraphMatching.stop_sampling_without_edges", BoolOf(&p.graph.stop_sampling_without_edges),
-      "end sampling after an iteration that found no edge");
   Add("GraphMatching.max_failed_samples", IntOf(&p.graph.max_failed_samples, 0),
       "draws (>= 0) of an image in a row that were no edges, after which it draws no more if it "
       "has a neighbour; 0: it spends its whole budget. 3 saves tests and loses few edges");
@@ -447,9 +421,7 @@ void Table::AddVectors() {
   Add("GraphMatching.num_components", IntOf(&vectors.gmm.num_components, 1),
       "Gaussians (>= 1) of the mixture; time and memory grow in proportion");
   Add("GraphMatching.max_num_features", IntOf(&vectors.max_num_features, 1),
-      "features (>= 1) of an image that are encoded at most");
-  Add("GraphMatching.feature_selection", OneOf(&vectors.feature_selection, kSelections),
-      "which, if it has more: those of the largest scales, or random ones");
+      "features (>= 1) of an image that are encoded at most, those of the largest scales");
   Add("GraphMatching.num_training_descriptors", IntOf(&vectors.num_training_descriptors, 1),
       "descriptors (>= 1) that the mixture is learnt from");
   Add("GraphMatching.ranking_path", TextOf(&ranking.ranking_path, "the path of ranked lists"),
@@ -467,11 +439,6 @@ void Table::AddMatching() {
   Add("GraphMatching.cache_gb", DoubleOf(&exact.cache_gb, Zero::kAllowed),
       "GB (>= 0) of descriptors kept in memory; 0: a quarter of the memory. Less reads images more "
       "often");
-  Add("GraphMatching.preemptive_num_features", IntOf(&exact.preemptive_num_features, 0),
-      "features (>= 1) of the largest scales that are matched first, to give up pairs with few "
-      "matches early, which loses edges; 0: match all at once");
-  Add("GraphMatching.preemptive_min_matches", IntOf(&exact.preemptive_min_matches, 1),
-      "matches (>= 1) of those that a pair needs, or else it counts as tested, without an edge");
 }
 
 void Table::AddWork() {
@@ -512,12 +479,6 @@ void Table::AddEvaluation() {
       "a finished matching graph that answers instead of COLMAP, to compare options in seconds: a "
       "matched COLMAP database, or lines of two images and their inliers, separated by tabs. "
       "Nothing is written to the database");
-  Add("GraphMatching.replay_matching_cost",
-      DoubleOf(&p.replay_costs.seconds_per_million_products, Zero::kAllowed),
-      "seconds (>= 0) of one core that a replay counts for a million products of descriptors");
-  Add("GraphMatching.replay_verification_cost",
-      DoubleOf(&p.replay_costs.seconds_per_verification, Zero::kAllowed),
-      "seconds (>= 0) of one core that it counts for a pair with enough matches to be verified");
 }
 
 void Table::AddLog() {

@@ -1,7 +1,9 @@
 #include "colmap_graphmatch/encoding/gmm.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/random.h"
@@ -25,6 +27,12 @@ constexpr double kEmptyComponent = 1e-3;
 constexpr int kMaxReplacedComponents = 16;
 
 constexpr double kLog2Pi = 1.8378770664093454836;
+
+std::string Hex(double value) {
+  std::array<char, 32> text = {};
+  std::snprintf(text.data(), text.size(), "%a", value);
+  return text.data();
+}
 
 Eigen::Index PaddedColumns(Eigen::Index num) {
   const auto padding = static_cast<Eigen::Index>(kColumnPadding);
@@ -196,6 +204,14 @@ void GmmOptions::Check() const {
   if (!(tolerance >= 0)) throw OptionsError("The tolerance of EM must not be negative.");
   if (max_num_iterations < 1) throw OptionsError("EM needs at least one iteration.");
   if (!(variance_floor > 0)) throw OptionsError("The smallest variance must be positive.");
+}
+
+std::string GmmOptions::Key() const {
+  // Does not compile if a field is forgotten.
+  const auto& [components, least_growth, iterations, floor, own_seed] = *this;
+  return "components " + std::to_string(components) + ", tolerance " + Hex(least_growth) +
+         ", iterations " + std::to_string(iterations) + ", variance floor " + Hex(floor) +
+         ", seed " + std::to_string(own_seed);
 }
 
 SufficientStatistics::SufficientStatistics(Eigen::Index num_components, Eigen::Index dim)

@@ -38,6 +38,9 @@ struct GmmOptions {
   // Of the k-means++ start.
   std::uint64_t seed = 0;
 
+  // Names the values of all fields: equal for equal options alone.
+  std::string Key() const;
+
   // Throws OptionsError.
   void Check() const;
 };

@@ -44,7 +44,6 @@ class Loop {
       const bool propagated = builder_.Continues() && Propagate();
       if (sampled || propagated) continue;
       iterations_.pop_back();
-      if (GoesOnAfterEmpty()) continue;
       if (!add_known_at_the_end || !builder_.AddKnown()) break;
       sampler_.ChargeTested(builder_.Graph());
     }
@@ -59,7 +58,6 @@ class Loop {
 
  private:
   bool Sample() {
-    if (sampling_over_) return false;
     const std::vector<VertexPair> pairs = sampler_.Propose(iteration_, builder_.Graph());
     sampler_.Charge();
     // Of the draws to come ever fewer coincide.
@@ -67,37 +65,21 @@ class Loop {
     last_sampling_ = builder_.Verify(LoopStage::kSampling, iteration_, pairs, ExpectedTestsAfter(0),
                                      ExpectedSamples());
     iterations_.back().sampling = last_sampling_;
-    sampling_over_ = options_.stop_sampling_without_edges &&
-                     last_sampling_.num_edges + last_sampling_.num_known_edges == 0;
     return !pairs.empty();
   }
 
   bool Propagate() {
-    const std::vector<VertexPair> pairs = colmap_graphmatch::Propagate(
-        options_, ranking_, builder_.Graph(),
-        options_.propagate_from_new_edges_only ? first_new_edge_ : 0, threads_);
-    first_new_edge_ = builder_.Graph().NumEdges();
+    const std::vector<VertexPair> pairs =
+        colmap_graphmatch::Propagate(options_, ranking_, builder_.Graph(), threads_);
     last_propagation_ = builder_.Verify(LoopStage::kPropagation, iteration_, pairs,
                                         ExpectedTestsAfter(pairs.size()), ExpectedSamples());
     iterations_.back().propagation = last_propagation_;
     return !pairs.empty();
   }
 
-  // After an iteration without a test: moves on to before the next one that may have some.
-  bool GoesOnAfterEmpty() {
-    const std::size_t num_vertices = ranking_.NumVertices();
-    const int next = options_.NextSamplingAfterEmpty(iteration_, num_vertices);
-    const bool lists_are_over =
-        options_.TestsInIteration(iteration_, num_vertices) > 0 && !sampler_.HasAdvanced();
-    if (sampling_over_ || lists_are_over || next >= options_.number_sample_iterations) return false;
-    iteration_ = next - 1;
-    return true;
-  }
-
   // In later iterations.
   double ExpectedSamples() const {
-    const int num_iterations =
-        sampling_over_ ? 0 : std::max(options_.number_sample_iterations - iteration_ - 1, 0);
+    const int num_iterations = std::max(options_.number_sample_iterations - iteration_ - 1, 0);
     return num_iterations * sampling_batch_;
   }
 
@@ -129,8 +111,6 @@ class Loop {
   StageStatistics last_sampling_;
   StageStatistics last_propagation_;
   double sampling_batch_ = 0;  // Expected tests of each sampling to come.
-  bool sampling_over_ = false;
-  std::size_t first_new_edge_ = 0;
   int iteration_ = 0;
 };
 

@@ -24,27 +24,15 @@ int GraphMatchOptions::MaxTestsForSampling(std::size_t num_images) const {
 
 int GraphMatchOptions::TestsInIteration(int iteration, std::size_t num_images) const {
   if (iteration < 0 || iteration >= number_sample_iterations) return 0;
-  const int budget = MaxTestsForSampling(num_images);
-  const int iterations = number_sample_iterations;
-  switch (sampling_schedule) {
-    case SamplingSchedule::kRound:
-      return std::max(1, (budget + iterations / 2) / iterations);
-    case SamplingSchedule::kCarry:
-      return static_cast<int>(static_cast<long>(budget) * (iteration + 1) / iterations -
-                              static_cast<long>(budget) * iteration / iterations);
-    case SamplingSchedule::kFloor:
-      break;
-  }
-  return std::max(1, budget / iterations);
+  return std::max(1, MaxTestsForSampling(num_images) / number_sample_iterations);
 }
 
-int GraphMatchOptions::NextSamplingAfterEmpty(int iteration, std::size_t num_images) const {
-  if (sample_untested_only && TestsInIteration(iteration, num_images) > 0) {
-    return number_sample_iterations;
-  }
-  int next = iteration + 1;
-  while (next < number_sample_iterations && TestsInIteration(next, num_images) == 0) ++next;
-  return next;
+std::string GraphMatchOptions::Key() const {
+  // Does not compile if a field is forgotten.
+  const auto& [iterations, neighbors, propagated, tests, failed, pairs] = *this;
+  return "iterations " + std::to_string(iterations) + ", neighbors " + std::to_string(neighbors) +
+         ", propagated " + std::to_string(propagated) + ", tests " + std::to_string(tests) +
+         ", failed " + std::to_string(failed) + ", " + pairs.Key();
 }
 
 void GraphMatchOptions::Check() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/ranking/ranking.h"
@@ -24,6 +25,9 @@ struct PairRestrictions {
   }
 
   bool Allows(Vertex a, Vertex b) const { return (Seeks(a) || Seeks(b)) && !SameFrame(a, b); }
+
+  // Names the values of all fields by their lengths and checksums.
+  std::string Key() const;
 };
 
 }  // namespace colmap_graphmatch

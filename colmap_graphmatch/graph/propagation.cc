@@ -27,36 +27,30 @@ class SourceCandidates {
         source_of_(ranking.NumVertices(), kNoVertex),
         entries_(ranking.NumVertices()) {}
 
-  // What (a, b) proposes, for b among `neighbors` of a: pairs of a with neighbours of b.
-  void Propagate(Vertex a, const std::vector<Vertex>& neighbors, std::vector<VertexPair>* pairs) {
+  // What (a, b) proposes, for every neighbour b of a: pairs of a with neighbours of b.
+  void Propagate(Vertex a, std::vector<VertexPair>* pairs) {
     if (!options_.restrictions.Seeks(a)) return;
     if (graph_.Degree(a) >= static_cast<std::size_t>(options_.max_num_neighbors)) return;
-    for (const Vertex b : neighbors) {
+    for (const Vertex b : graph_.Neighbors(a)) {
       candidates_.clear();
       for (const Vertex c : graph_.Neighbors(b)) {
         if (c == a) continue;
         const Entry& entry = Get(a, c);
-        if (!entry.is_candidate) continue;
-        const bool from_source =
-            options_.propagation_distance == GraphMatchOptions::PropagationDistance::kSource;
-        candidates_.emplace_back(from_source ? entry.distance : ranking_.Distance(b, c), c);
+        if (entry.is_candidate) candidates_.emplace_back(entry.distance, c);
       }
       const auto num = static_cast<std::ptrdiff_t>(
           std::min(candidates_.size(), static_cast<std::size_t>(options_.num_to_propagate)));
       std::partial_sort(candidates_.begin(), candidates_.begin() + num, candidates_.end());
       for (auto candidate = candidates_.begin(); candidate != candidates_.begin() + num;
            ++candidate) {
-        if (!entries_[candidate->second].is_tested) {
-          pairs->push_back(MakeVertexPair(a, candidate->second));
-        }
+        pairs->push_back(MakeVertexPair(a, candidate->second));
       }
     }
   }
 
  private:
   struct Entry {
-    float distance = 0;  // d(a, c), of candidates if it is asked for.
-    bool is_tested = false;
+    float distance = 0;  // d(a, c), of candidates.
     bool is_candidate = false;
   };
 
@@ -64,13 +58,8 @@ class SourceCandidates {
     Entry& entry = entries_[c];
     if (source_of_[c] == a) return entry;
     source_of_[c] = a;
-    entry.is_tested = graph_.IsTested(a, c);
-    entry.is_candidate = !options_.restrictions.SameFrame(a, c) &&
-                         !(options_.propagate_untested_only && entry.is_tested);
-    if (entry.is_candidate &&
-        options_.propagation_distance == GraphMatchOptions::PropagationDistance::kSource) {
-      entry.distance = ranking_.Distance(a, c);
-    }
+    entry.is_candidate = !options_.restrictions.SameFrame(a, c) && !graph_.IsTested(a, c);
+    if (entry.is_candidate) entry.distance = ranking_.Distance(a, c);
     return entry;
   }
 
@@ -85,28 +74,16 @@ class SourceCandidates {
 }  // namespace
 
 std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Ranking& ranking,
-                                  const MatchingGraph& graph, std::size_t first_edge,
-                                  ThreadPool& threads) {
-  const std::vector<VertexPair>& edges = graph.Edges();
-  if (first_edge >= edges.size()) return {};
+                                  const MatchingGraph& graph, ThreadPool& threads) {
+  if (graph.NumEdges() == 0) return {};
   const std::size_t num_vertices = graph.NumVertices();
-  std::vector<std::vector<Vertex>> new_neighbors;
-  if (first_edge > 0) {
-    new_neighbors.resize(num_vertices);
-    for (std::size_t i = first_edge; i < edges.size(); ++i) {
-      new_neighbors[edges[i].first].push_back(edges[i].second);
-      new_neighbors[edges[i].second].push_back(edges[i].first);
-    }
-  }
   const std::size_t num_tasks = (num_vertices + kVerticesPerTask - 1) / kVerticesPerTask;
   std::vector<std::vector<VertexPair>> proposals(num_tasks);
   threads.ParallelFor(num_tasks, [&](std::size_t task) {
     SourceCandidates candidates(options, ranking, graph);
     const std::size_t end = std::min((task + 1) * kVerticesPerTask, num_vertices);
     for (std::size_t i = task * kVerticesPerTask; i < end; ++i) {
-      const auto a = static_cast<Vertex>(i);
-      candidates.Propagate(a, first_edge > 0 ? new_neighbors[i] : graph.Neighbors(a),
-                           &proposals[task]);
+      candidates.Propagate(static_cast<Vertex>(i), &proposals[task]);
     }
   });
   return UniteProposals(proposals);

@@ -11,12 +11,11 @@
 namespace colmap_graphmatch {
 
 // The propagation stage (GraphMatch, section 3.3): along every edge (A, B), and (B, A), if A has
-// fewer than max_num_neighbors neighbours, up to num_to_propagate neighbours C of B that look most
-// like A are proposed as pairs (A, C). first_edge: the edges before this index of graph.Edges() are
-// left out. Returns the pairs ascending, each once.
+// fewer than max_num_neighbors neighbours, up to num_to_propagate neighbours C of B that were not
+// tested with A and look most like it are proposed as pairs (A, C). Returns the pairs ascending,
+// each once.
 std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Ranking& ranking,
-                                  const MatchingGraph& graph, std::size_t first_edge,
-                                  ThreadPool& threads);
+                                  const MatchingGraph& graph, ThreadPool& threads);
 
 // The untested pairs that propagation could propose along all edges if num_to_propagate were no
 // limit.

@@ -9,7 +9,6 @@ Sampler::Sampler(const GraphMatchOptions& options, const Ranking& ranking, Threa
       ranking_(ranking),
       threads_(threads),
       cursors_(ranking.NumVertices()),
-      num_places_(ranking.NumVertices()),
       num_drawn_(ranking.NumVertices()),
       num_failed_(ranking.NumVertices()),
       drawn_(ranking.NumVertices()) {}
@@ -49,26 +48,6 @@ std::vector<Vertex> Sampler::NextUntested(Vertex vertex, std::size_t num,
   return untested;
 }
 
-std::vector<Vertex> Sampler::UntestedOfNext(Vertex vertex, std::size_t num,
-                                            const MatchingGraph& graph) {
-  std::vector<Vertex> untested;
-  const auto take = [&](const std::vector<Vertex>& list) {
-    const std::size_t end = std::min(cursors_[vertex] + num, list.size());
-    for (std::size_t i = cursors_[vertex]; i < end; ++i) {
-      ++num_places_[vertex];
-      const Vertex other = list[i];
-      if (!graph.IsTested(vertex, other) && !options_.restrictions.SameFrame(vertex, other)) {
-        untested.push_back(other);
-      }
-    }
-  };
-  const std::vector<Vertex>& nearest = ranking_.NearestOf(vertex);
-  const bool needs_all =
-      cursors_[vertex] + num > nearest.size() && nearest.size() + 1 < ranking_.NumVertices();
-  take(needs_all ? ranking_.AllOf(vertex) : nearest);
-  return untested;
-}
-
 std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& graph) {
   const std::size_t num_vertices = ranking_.NumVertices();
   const int budget = options_.MaxTestsForSampling(num_vertices);
@@ -77,15 +56,12 @@ std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& gra
     const auto vertex = static_cast<Vertex>(i);
     const bool gives_up = GivesUp(vertex, graph);
     drawn_[i].clear();
-    num_places_[i] = 0;
     const int num = std::min(tests, budget - num_drawn_[i]);
     if (num <= 0 || gives_up || !options_.restrictions.Seeks(vertex) ||
         graph.Degree(vertex) >= static_cast<std::size_t>(options_.max_num_neighbors)) {
       return;
     }
-    const auto count = static_cast<std::size_t>(num);
-    drawn_[i] = options_.sample_untested_only ? NextUntested(vertex, count, graph)
-                                              : UntestedOfNext(vertex, count, graph);
+    drawn_[i] = NextUntested(vertex, static_cast<std::size_t>(num), graph);
   });
   std::vector<VertexPair> pairs;
   for (Vertex vertex = 0; vertex < num_vertices; ++vertex) {
@@ -102,19 +78,12 @@ std::size_t Sampler::NumDrawn() const {
   return num_drawn;
 }
 
-bool Sampler::HasAdvanced() const {
-  return std::any_of(num_places_.begin(), num_places_.end(),
-                     [](std::size_t num_places) { return num_places > 0; });
-}
-
 void Sampler::ChargeTested(const MatchingGraph& graph) {
   const std::size_t num_vertices = ranking_.NumVertices();
   const int budget = options_.MaxTestsForSampling(num_vertices);
-  int num_planned = 0;  // What the schedule leaves of the budget.
-  for (int iteration = 0; iteration < options_.number_sample_iterations; ++iteration) {
-    num_planned += options_.TestsInIteration(iteration, num_vertices);
-    if (num_planned >= budget) break;
-  }
+  // What the iterations leave of the budget.
+  const int num_planned = std::min(
+      budget, options_.number_sample_iterations * options_.TestsInIteration(0, num_vertices));
   threads_.ParallelFor(num_vertices, [&](std::size_t i) {
     const auto vertex = static_cast<Vertex>(i);
     if (graph.NumTestedOf(vertex) == 0) return;
@@ -132,23 +101,8 @@ void Sampler::ChargeTested(const MatchingGraph& graph) {
 }
 
 void Sampler::Charge() {
-  for (std::size_t i = 0; i < drawn_.size(); ++i) cursors_[i] += num_places_[i];
-  if (!options_.count_incoming_tests) {
-    for (std::size_t i = 0; i < drawn_.size(); ++i) {
-      num_drawn_[i] +=
-          static_cast<int>(options_.sample_untested_only ? drawn_[i].size() : num_places_[i]);
-    }
-    return;
-  }
-  for (Vertex vertex = 0; vertex < drawn_.size(); ++vertex) {
-    for (const Vertex other : drawn_[vertex]) {
-      // A pair that both of its images drew is one test for each of them.
-      const std::vector<Vertex>& drawn_by_other = drawn_[other];
-      const bool mutual =
-          std::find(drawn_by_other.begin(), drawn_by_other.end(), vertex) != drawn_by_other.end();
-      ++num_drawn_[vertex];
-      if (!mutual) ++num_drawn_[other];
-    }
+  for (std::size_t i = 0; i < drawn_.size(); ++i) {
+    num_drawn_[i] += static_cast<int>(drawn_[i].size());
   }
 }
 

@@ -24,9 +24,6 @@ class Sampler {
   // other.
   std::size_t NumDrawn() const;
 
-  // Whether any vertex went on in its list with the last proposal (without sample_untested_only).
-  bool HasAdvanced() const;
-
   // Charges the proposed pairs to the budgets of the vertices that drew them. To be called once for
   // every proposal that is tested, before the next one is made.
   void Charge();
@@ -46,18 +43,12 @@ class Sampler {
   // it.
   std::vector<Vertex> NextUntested(Vertex vertex, std::size_t num, const MatchingGraph& graph);
 
-  // The places of the vertex's list that are next, as far as they are untested. Charge goes on
-  // behind them.
-  std::vector<Vertex> UntestedOfNext(Vertex vertex, std::size_t num, const MatchingGraph& graph);
-
   GraphMatchOptions options_;
   const Ranking& ranking_;
   ThreadPool& threads_;
-  // By vertex: all before this place of its list are tested, or were drawn.
-  std::vector<std::size_t> cursors_;
-  std::vector<std::size_t> num_places_;     // By vertex: of the list, in the last proposal.
-  std::vector<int> num_drawn_;              // By vertex: spent of the budget.
-  std::vector<int> num_failed_;             // By vertex: its last draws in a row without an edge.
+  std::vector<std::size_t> cursors_;  // By vertex: all before this place of its list are tested.
+  std::vector<int> num_drawn_;        // By vertex: spent of the budget.
+  std::vector<int> num_failed_;       // By vertex: its last draws in a row without an edge.
   std::vector<std::vector<Vertex>> drawn_;  // By vertex: the last proposal.
 };
 

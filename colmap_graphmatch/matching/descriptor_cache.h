@@ -23,17 +23,8 @@ namespace colmap_graphmatch {
 struct MatchingFeatures {
   std::vector<std::uint8_t> descriptors;
 
-  // Those of the largest scales alone, if pairs are tried with these first; empty otherwise.
-  std::vector<std::uint8_t> largest_scales;
-
-  DescriptorView All() const { return View(descriptors); }
-  DescriptorView LargestScales() const { return View(largest_scales); }
-  std::size_t NumBytes() const { return descriptors.size() + largest_scales.size(); }
-
- private:
-  static DescriptorView View(const std::vector<std::uint8_t>& data) {
-    return {data.data(), data.size() / kDescriptorDim};
-  }
+  DescriptorView View() const { return {descriptors.data(), descriptors.size() / kDescriptorDim}; }
+  std::size_t NumBytes() const { return descriptors.size(); }
 };
 
 // Features of the images that were used last, bounded in bytes, read by threads of its own. All

@@ -1,7 +1,6 @@
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 
 #include <algorithm>
-#include <boost/crc.hpp>
 #include <functional>
 #include <map>
 #include <memory>
@@ -38,22 +37,8 @@ std::vector<ImageId> Ids(const std::vector<ImageRecord>& images) {
 
 // What the seeds of a loop depend on, apart from the images and their vectors.
 std::string LoopKey(const PipelineOptions& options, const GraphMatchOptions& graph) {
-  boost::crc_32_type restrictions;
-  for (const bool seeks : graph.restrictions.seeking) restrictions.process_byte(seeks ? 1 : 0);
-  for (const std::uint32_t frame : graph.restrictions.frames) {
-    restrictions.process_bytes(&frame, sizeof(frame));
-  }
-  std::string key = "loop";
-  for (const int value :
-       {graph.number_sample_iterations, graph.max_num_neighbors, graph.num_to_propagate,
-        graph.max_tests_for_sampling, static_cast<int>(graph.sampling_schedule),
-        graph.count_incoming_tests ? 1 : 0, graph.sample_untested_only ? 1 : 0,
-        static_cast<int>(graph.propagation_distance), graph.propagate_untested_only ? 1 : 0,
-        graph.propagate_from_new_edges_only ? 1 : 0, graph.stop_sampling_without_edges ? 1 : 0,
-        graph.max_failed_samples, options.verification.min_num_inliers}) {
-    key += " " + std::to_string(value);
-  }
-  return key + ", restrictions " + std::to_string(restrictions.checksum());
+  return "loop: " + graph.Key() + ", inliers " +
+         std::to_string(options.verification.min_num_inliers);
 }
 
 bool RetrievesOnce(PipelineOptions::Strategy strategy) {
@@ -332,7 +317,7 @@ ReplayVerifier MakeReplayVerifier(const Job& job) {
   std::unordered_map<ImageId, std::size_t> num_features;
   for (const ImageRecord& image : job.images) num_features[image.id] = image.num_features;
   verifier.SetStop(&job.stop);
-  verifier.SetCosts(options.replay_costs, std::move(num_features), job.threads.NumThreads());
+  verifier.SetCosts(std::move(num_features), job.threads.NumThreads());
   return verifier;
 }
 

@@ -78,7 +78,6 @@ struct PipelineOptions {
   // verify them, unless it is empty. Nothing is written to the database, and what it knows of pairs
   // is not used.
   std::filesystem::path replay_path;
-  ReplayCosts replay_costs;
 
   // Writes every tested pair to this CSV file (see test_log.h), unless it is empty.
   std::filesystem::path test_log_path;

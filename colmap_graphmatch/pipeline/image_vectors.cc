@@ -31,10 +31,6 @@ struct SelectedDescriptors {
       : num(rows.size()), data(all.CopyRows(rows)) {}
 };
 
-Random ImageRandom(const ImageVectorOptions& options, RandomStage stage, ImageId image_id) {
-  return Random({options.seed, static_cast<std::uint64_t>(stage), image_id});
-}
-
 // On a thread of its own, or, if the system gives none, when it is asked for.
 template <typename Function>
 auto Start(Function function) -> std::future<decltype(function())> {
@@ -98,6 +94,15 @@ void ImageVectorOptions::Check() const {
   }
 }
 
+std::string ImageVectorOptions::Key() const {
+  // Does not compile if a field is forgotten.
+  const auto& [described_by, photos, vectors, dim, mixture, num_training, num_features, own_seed] =
+      *this;
+  return "descriptor " + std::to_string(static_cast<int>(described_by)) + ", PCA " +
+         std::to_string(dim) + ", " + mixture.Key() + ", training " + std::to_string(num_training) +
+         ", features " + std::to_string(num_features) + ", seed " + std::to_string(own_seed);
+}
+
 VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database& database,
                                      const std::vector<ImageRecord>& images, ThreadPool& threads,
                                      const StopRequest& stop) {
@@ -116,10 +121,10 @@ VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database
       images, threads, stop,
       [&](const ImageRecord& image) {
         const Descriptors descriptors = database.ReadDescriptors(image);
-        return SelectedDescriptors(
-            descriptors,
-            SelectRandom(descriptors.num_rows, per_image,
-                         ImageRandom(options, RandomStage::kTrainingSample, image.id)));
+        const Random random(
+            {options.seed, static_cast<std::uint64_t>(RandomStage::kTrainingSample), image.id});
+        return SelectedDescriptors(descriptors,
+                                   SelectRandom(descriptors.num_rows, per_image, random));
       },
       [&](std::size_t i, const SelectedDescriptors& selected) {
         samples.middleRows(first_rows[i], first_rows[i + 1] - first_rows[i]) =
@@ -170,12 +175,6 @@ std::vector<float> EncodeImages(const ImageVectorOptions& options, const VectorM
   const auto max_num_features = static_cast<std::size_t>(options.max_num_features);
   const auto select = [&](const ImageRecord& image) {
     const Descriptors descriptors = database.ReadDescriptors(image);
-    if (options.feature_selection == ImageVectorOptions::FeatureSelection::kRandom) {
-      return SelectedDescriptors(
-          descriptors,
-          SelectRandom(descriptors.num_rows, max_num_features,
-                       ImageRandom(options, RandomStage::kFeatureSelection, image.id)));
-    }
     const std::vector<float> scales = database.ReadKeypoints(image.id).Scales(descriptors.num_rows);
     return SelectedDescriptors(descriptors, SelectLargestScales(scales, max_num_features));
   };

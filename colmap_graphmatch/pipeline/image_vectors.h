@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/base/stop_request.h"
@@ -37,14 +38,13 @@ struct ImageVectorOptions {
   // all if it has fewer), drawn at random. More cost proportionally more time and 512 bytes each.
   int num_training_descriptors = 100000;
 
-  // Descriptors an image that are encoded at most. Paper: 1,000.
+  // Descriptors an image that are encoded at most: those of the largest scales. Paper: 1,000.
   int max_num_features = 1000;
 
-  // Which of them, if the image has more.
-  enum class FeatureSelection { kLargestScales, kRandom };
-  FeatureSelection feature_selection = FeatureSelection::kLargestScales;
-
   std::uint64_t seed = 0;
+
+  // Names the values of all fields but the paths: their contents count, not where they are.
+  std::string Key() const;
 
   // Throws OptionsError.
   void Check() const;

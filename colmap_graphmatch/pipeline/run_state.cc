@@ -1,7 +1,6 @@
 #include "colmap_graphmatch/pipeline/run_state.h"
 
 #include <algorithm>
-#include <array>
 #include <boost/crc.hpp>
 #include <utility>
 
@@ -10,12 +9,6 @@
 
 namespace colmap_graphmatch {
 namespace {
-
-std::string Hex(double value) {
-  std::array<char, 32> text = {};
-  std::snprintf(text.data(), text.size(), "%a", value);
-  return text.data();
-}
 
 std::string Checksum(const void* data, std::size_t size) {
   boost::crc_32_type crc;
@@ -73,17 +66,8 @@ void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFinger
     vectors_key_ = "GIST of " + photos_checksum;
     return;
   }
-  const GmmOptions& gmm = options.gmm;
-  shape_ = {gmm.num_components, options.pca_dim};
-  vectors_key_ = "descriptor " + std::to_string(static_cast<int>(options.descriptor)) + ", PCA " +
-                 std::to_string(options.pca_dim) + ", components " +
-                 std::to_string(gmm.num_components) + ", tolerance " + Hex(gmm.tolerance) +
-                 ", iterations " + std::to_string(gmm.max_num_iterations) + ", variance floor " +
-                 Hex(gmm.variance_floor) + ", training " +
-                 std::to_string(options.num_training_descriptors) + ", features " +
-                 std::to_string(options.max_num_features) + ", selection " +
-                 std::to_string(static_cast<int>(options.feature_selection)) + ", seed " +
-                 std::to_string(options.seed) + " " + std::to_string(gmm.seed);
+  shape_ = {options.gmm.num_components, options.pca_dim};
+  vectors_key_ = options.Key();
 }
 
 void RunState::SelectGiven(const std::string& ranking_key, std::vector<ImageFingerprint> images) {

@@ -83,7 +83,6 @@ MatchingStatistics BatchVerifier::Statistics() const {
   statistics.num_failed = num_failed_;
   if (exact_matcher_) {
     statistics.num_matched = exact_matcher_->NumPairs();
-    statistics.num_preempted = exact_matcher_->NumPreempted();
     statistics.num_image_reads = exact_matcher_->NumReads();
   }
   return statistics;

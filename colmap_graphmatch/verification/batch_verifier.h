@@ -24,8 +24,7 @@ namespace colmap_graphmatch {
 struct MatchingStatistics {
   double seconds = 0;             // CPU time of matching descriptors here, summed over threads.
   std::size_t num_matched = 0;    // Pairs whose descriptors were matched here,
-  std::size_t num_preempted = 0;  // those of them given up after the features of largest scale,
-  std::size_t num_unmatched = 0;  // and those with fewer matches than an edge needs inliers.
+  std::size_t num_unmatched = 0;  // those of them with fewer matches than an edge needs inliers.
   std::size_t num_image_reads = 0;
   std::size_t num_failed = 0;  // Pairs on which the geometric verification failed.
 };

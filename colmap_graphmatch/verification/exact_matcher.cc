@@ -5,11 +5,9 @@
 #include <deque>
 #include <limits>
 #include <memory>
-#include <string>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/base/largest_scales.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -43,17 +41,6 @@ void ExactMatcherOptions::Check() const {
   if (!(cache_gb >= 0 && std::isfinite(cache_gb))) {
     throw OptionsError("cache_gb must be positive, or 0 to have it chosen.");
   }
-  if (preemptive_num_features < 0) {
-    throw OptionsError("preemptive_num_features must be positive, or 0 to match all features.");
-  }
-  if (preemptive_min_matches < 1) {
-    throw OptionsError("preemptive_min_matches must be at least 1.");
-  }
-  if (preemptive_num_features > 0 && preemptive_min_matches > preemptive_num_features) {
-    throw OptionsError("preemptive_min_matches is " + std::to_string(preemptive_min_matches) +
-                       ", more than the " + std::to_string(preemptive_num_features) +
-                       " features that are matched first: no pair could pass.");
-  }
 }
 
 ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
@@ -66,28 +53,16 @@ ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
              [this, database_path, patience]() -> DescriptorCache::Reader {
                const auto database =
                    std::make_shared<Database>(database_path, sqlite::Access::kRead, patience);
-               return
-                   [this, database](ImageId image) { return ReadFeatures(database.get(), image); };
+               return [this, database](ImageId image) {
+                 return MatchingFeatures{database->ReadDescriptors(images_.at(image)).data};
+               };
              }) {}
-
-MatchingFeatures ExactMatcher::ReadFeatures(Database* database, ImageId image) const {
-  Descriptors descriptors = database->ReadDescriptors(images_.at(image));
-  MatchingFeatures features;
-  if (options_.preemptive_num_features > 0) {
-    features.largest_scales = descriptors.CopyRows(
-        SelectLargestScales(database->ReadKeypoints(image).Scales(descriptors.num_rows),
-                            static_cast<std::size_t>(options_.preemptive_num_features)));
-  }
-  features.descriptors = std::move(descriptors.data);
-  return features;
-}
 
 bool ExactMatcher::Match(const std::vector<ImagePair>& pairs,
                          const std::function<bool()>& should_stop,
                          std::vector<std::vector<FeatureMatch>>* matches) {
   DescriptorMatcher matcher(options_.matching);
   std::deque<std::pair<DescriptorCache::Handle, DescriptorCache::Handle>> requested;
-  const auto min_matches = static_cast<std::size_t>(options_.preemptive_min_matches);
   std::size_t next = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (should_stop()) return false;
@@ -99,13 +74,7 @@ bool ExactMatcher::Match(const std::vector<ImagePair>& pairs,
     const MatchingFeatures& features1 = cache_.Wait(handle1);
     const MatchingFeatures& features2 = cache_.Wait(handle2);
     ++num_pairs_;
-    if (options_.preemptive_num_features > 0 &&
-        matcher.Match(features1.LargestScales(), features2.LargestScales()).size() < min_matches) {
-      ++num_preempted_;
-      matches->emplace_back();
-      continue;
-    }
-    matches->push_back(matcher.Match(features1.All(), features2.All()));
+    matches->push_back(matcher.Match(features1.View(), features2.View()));
   }
   return true;
 }

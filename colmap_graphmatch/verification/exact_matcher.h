@@ -21,13 +21,6 @@ struct ExactMatcherOptions {
   // fit is read again, with the same result.
   double cache_gb = 0;
 
-  // Match this many features of the largest scales first, and take a pair for unmatched, tested
-  // like any other, if fewer than preemptive_min_matches (at most as many) of them match (Wu,
-  // Towards Linear-Time Incremental Structure from Motion, 3DV 2013, section 3.1). 0: match all
-  // features of every pair. Faster, and loses weak edges (docs/benchmarks.md).
-  int preemptive_num_features = 0;
-  int preemptive_min_matches = 2;
-
   // Throws OptionsError.
   void Check() const;
 };
@@ -47,21 +40,17 @@ class ExactMatcher {
   bool Match(const std::vector<ImagePair>& pairs, const std::function<bool()>& should_stop,
              std::vector<std::vector<FeatureMatch>>* matches);
 
-  // Pairs matched so far, and those of them that the largest scales alone ruled out.
+  // Pairs matched so far.
   std::size_t NumPairs() const { return num_pairs_; }
-  std::size_t NumPreempted() const { return num_preempted_; }
 
   // Images read from the database so far; some more than once if the cache is small.
   std::size_t NumReads() const { return cache_.NumReads(); }
 
  private:
-  MatchingFeatures ReadFeatures(Database* database, ImageId image) const;
-
   ExactMatcherOptions options_;
   std::map<ImageId, ImageRecord> images_;
   DescriptorCache cache_;
   std::atomic<std::size_t> num_pairs_{0};
-  std::atomic<std::size_t> num_preempted_{0};
 };
 
 }  // namespace colmap_graphmatch

@@ -19,14 +19,6 @@ struct ReplayedPair {
   bool is_verified = true;  // The pair had enough matches for the geometric verification.
 };
 
-// What testing a pair costs, in seconds of one core. Measured with the exact matcher on VNNI and
-// COLMAP 3.8, on 569 photos with 2,815 features each (docs/benchmarks.md, the whole job: 29 s for
-// 11,099 pairs, and 24 ms for each of 5,553).
-struct ReplayCosts {
-  double seconds_per_million_products = 3.3e-4;  // Of matching n1 with n2 descriptors: n1 n2.
-  double seconds_per_verification = 0.024;
-};
-
 // Answers from a finished matching graph instead of matching: pairs among the given ones as they
 // are, all others are no edges and have too few matches to be verified. For tests and for comparing
 // strategies on the same truth.
@@ -40,9 +32,9 @@ class ReplayVerifier : public PairVerifier {
   // Makes pairs known that were tested before the run; their outcomes come from the edges.
   void SetKnownPairs(std::vector<ImagePair> pairs);
 
-  // num_features: of every image that is asked for. Without this, tests cost nothing.
-  void SetCosts(const ReplayCosts& costs, std::unordered_map<ImageId, std::size_t> num_features,
-                int num_threads);
+  // From these the time of tests is modelled. num_features: of every image that is asked for.
+  // Without this, tests take no time.
+  void SetCosts(std::unordered_map<ImageId, std::size_t> num_features, int num_threads);
 
   // Answers no more when this asks for it.
   void SetStop(const StopRequest* stop) { stop_ = stop; }
@@ -61,7 +53,6 @@ class ReplayVerifier : public PairVerifier {
 
   std::unordered_map<ImagePair, ReplayedPair> pairs_;
   std::vector<VerifiedPair> known_pairs_;
-  ReplayCosts costs_;
   std::unordered_map<ImageId, std::size_t> num_features_;
   int num_threads_ = 1;
   const StopRequest* stop_ = nullptr;

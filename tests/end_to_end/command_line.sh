@@ -21,7 +21,6 @@ expect_exit 1 'Did you mean --SiftMatching.max_ratio?' "${run[@]}" --SiftMatchin
 expect_exit 1 'Did you mean --TwoViewGeometry.min_num_inliers?' "${run[@]}" --Mapper.min_num_inlier 20
 expect_exit 1 '--GraphMatching.max_num_neighbors is "0"; it must be an integer of at least 1' \
   "${run[@]}" --GraphMatching.max_num_neighbors 0
-expect_exit 1 'must be one of carry, floor, round' "${run[@]}" --GraphMatching.sampling_schedule x
 expect_exit 1 '--SiftMatching.max_ratio is "zero"; it must be a number greater than 0' \
   "${run[@]}" --SiftMatching.max_ratio zero
 expect_exit 1 'the same option with different values' "${run[@]}" --SiftMatching.max_error 4 \
@@ -201,12 +200,8 @@ expect_pairs 180
 expect_pairs 0 --SiftMatching.max_distance 0.001
 expect_pairs 0 --SiftMatching.max_ratio 0.01
 expect_pairs 0 --FeatureMatching.max_num_matches 5
-expect_pairs 0 --GraphMatching.preemptive_num_features 3 --GraphMatching.preemptive_min_matches 3 \
-  --SiftMatching.max_ratio 0.01
 # Without the cross check and without limits every feature matches, in all pairs.
 expect_pairs 780 --SiftMatching.cross_check 0 --SiftMatching.max_ratio 10 --SiftMatching.max_distance 4
-expect_exit 1 'no pair could pass' "${run[@]}" --GraphMatching.preemptive_num_features 3 \
-  --GraphMatching.preemptive_min_matches 4
 
 echo "== All pairs, and those of a list"
 cp "$work/untouched.db" "$work/exhaustive.db"
