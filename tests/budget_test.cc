@@ -188,7 +188,7 @@ TEST(RunRecord, KnownPairsOfImagesThatAreGoneAreLeftOut) {
   LoopProgress progress = Progress(LoopStage::kSampling, 0, 1, 1);
   record.Add(progress, 1);
   progress.last = {ImagePair(1, 3), PairOutcome::kNoEdge, 0};
-  progress.last_is_known = true;
+  progress.last.is_known = true;
   record.Add(progress, 2);
   record.AddKnown(
       {{ImagePair(1, 3), PairOutcome::kNoEdge, 0}, {ImagePair(1, 8), PairOutcome::kEdge, 50}},

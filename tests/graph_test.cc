@@ -17,6 +17,7 @@
 #include "colmap_graphmatch/graph/retrieval.h"
 #include "colmap_graphmatch/graph/sampling.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
+#include "tests/support/explore.h"
 #include "tests/support/recording_verifier.h"
 #include "tests/support/reference_graphmatch.h"
 
@@ -90,8 +91,8 @@ std::set<ImagePair> ImageEdges(const Scene& scene, const std::vector<ImageId>& i
   return edges;
 }
 
-GraphMatchResult RunLoop(const GraphMatchOptions& options, const Ranking& ranking,
-                         RecordingVerifier* verifier, int num_threads = 2) {
+ExplorationResult RunLoop(const GraphMatchOptions& options, const Ranking& ranking,
+                          RecordingVerifier* verifier, int num_threads = 2) {
   ThreadPool threads(num_threads);
   return RunGraphMatch(options, ranking, MakeIds(ranking.NumVertices()), *verifier, threads,
                        nullptr);
@@ -372,7 +373,7 @@ TEST_P(EveryChoice, TestsTheSamePairsAsThePseudoCode) {
     const Scene scene = MakeScene(6, 14, 4, 0.6, seed);
     const VectorRanking ranking = MakeRanking(scene);
     RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
-    const GraphMatchResult result = RunLoop(GetParam().options, ranking, &verifier);
+    const ExplorationResult result = RunLoop(GetParam().options, ranking, &verifier);
     EXPECT_EQ(AsSets(verifier.batches), ReferenceBatches(GetParam().options, ranking, scene));
     EXPECT_TRUE(result.finished);
   }
@@ -418,7 +419,7 @@ TEST_P(EveryChoice, GoesOnAfterAnInterruptionAsIfThereWasNone) {
   const VectorRanking ranking = MakeRanking(scene);
   const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
   RecordingVerifier undisturbed(edges);
-  const GraphMatchResult expected = RunLoop(GetParam().options, ranking, &undisturbed);
+  const ExplorationResult expected = RunLoop(GetParam().options, ranking, &undisturbed);
   const std::set<ImagePair> all(undisturbed.tested.begin(), undisturbed.tested.end());
   for (std::size_t stop = 0; stop <= all.size(); stop += 37) {
     RecordingVerifier first(edges);
@@ -426,7 +427,7 @@ TEST_P(EveryChoice, GoesOnAfterAnInterruptionAsIfThereWasNone) {
     EXPECT_EQ(RunLoop(GetParam().options, ranking, &first).finished, stop >= all.size());
     RecordingVerifier second(edges);
     second.known.insert(first.tested.begin(), first.tested.end());
-    const GraphMatchResult result = RunLoop(GetParam().options, ranking, &second);
+    const ExplorationResult result = RunLoop(GetParam().options, ranking, &second);
     std::set<ImagePair> both(first.tested.begin(), first.tested.end());
     EXPECT_EQ(both.size(), first.tested.size());
     for (const ImagePair& pair : second.tested) EXPECT_TRUE(both.insert(pair).second);
@@ -441,12 +442,13 @@ INSTANTIATE_TEST_SUITE_P(Loop, EveryChoice, ::testing::ValuesIn(AllChoices()),
 TEST(Loop, FindsTheWholeGraphOfWellSeparatedPlaces) {
   const Scene scene = MakeScene(12, 20, 5, 0.25, 3);
   RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
   EXPECT_EQ(result.graph.NumEdges(), scene.edges.size());
   EXPECT_EQ(result.num_components, 12U);
   EXPECT_EQ(result.largest_component, 20U);
   EXPECT_EQ(result.num_isolated, 0U);
-  const StageStatistics all = result.sampling + result.propagation;
+  const StageStatistics all =
+      result.stages[LoopStage::kSampling] + result.stages[LoopStage::kPropagation];
   EXPECT_EQ(all.num_edges, scene.edges.size());
   EXPECT_EQ(all.num_tested, verifier.tested.size());
   // Every pair within a place may be worth a test, and sampling tests some between places.
@@ -456,15 +458,15 @@ TEST(Loop, FindsTheWholeGraphOfWellSeparatedPlaces) {
 TEST(Loop, StatisticsOfIterationsAddUp) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 2);
   RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
   StageStatistics sampling;
   StageStatistics propagation;
   for (const IterationStatistics& iteration : result.iterations) {
-    sampling = sampling + iteration.sampling;
-    propagation = propagation + iteration.propagation;
+    sampling = sampling + iteration.stages[LoopStage::kSampling];
+    propagation = propagation + iteration.stages[LoopStage::kPropagation];
   }
-  EXPECT_EQ(sampling.num_tested, result.sampling.num_tested);
-  EXPECT_EQ(propagation.num_tested, result.propagation.num_tested);
+  EXPECT_EQ(sampling.num_tested, result.stages[LoopStage::kSampling].num_tested);
+  EXPECT_EQ(propagation.num_tested, result.stages[LoopStage::kPropagation].num_tested);
   EXPECT_EQ(sampling.num_edges + propagation.num_edges, result.graph.NumEdges());
   EXPECT_EQ(result.graph.NumTested(), verifier.tested.size());
 }
@@ -472,14 +474,14 @@ TEST(Loop, StatisticsOfIterationsAddUp) {
 TEST(Loop, TerminatesOnACompleteGraph) {
   Scene scene = MakeScene(1, 60, 60, 0.5, 4);
   RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
   EXPECT_EQ(result.graph.NumEdges(), 60U * 59U / 2U);
 }
 
 TEST(Loop, TerminatesWithoutAnyEdge) {
   const Scene scene = MakeScene(4, 10, 0, 0.5, 4);
   RecordingVerifier verifier({});
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
   EXPECT_EQ(result.graph.NumEdges(), 0U);
   EXPECT_EQ(result.num_isolated, 40U);
   EXPECT_EQ(result.iterations.size(), 10U);
@@ -494,7 +496,7 @@ TEST(Loop, EndsWhenNothingIsLeftToSampleThoughIterationsAre) {
   for (const int budget : {10, 1000000000}) {
     options.max_tests_for_sampling = budget;
     RecordingVerifier verifier(edges);
-    const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &verifier);
+    const ExplorationResult result = RunLoop(options, MakeRanking(scene), &verifier);
     EXPECT_LE(result.iterations.size(), 40U);
     EXPECT_EQ(result.graph.NumTested(), verifier.tested.size());
   }
@@ -508,10 +510,10 @@ TEST(Loop, GivesUpSamplingOfAnImageThatHasANeighbour) {
   GraphMatchOptions options;
   options.num_to_propagate = 0;
   RecordingVerifier all(edges);
-  const GraphMatchResult spent = RunLoop(options, ranking, &all);
+  const ExplorationResult spent = RunLoop(options, ranking, &all);
   options.max_failed_samples = 2;
   RecordingVerifier some(edges);
-  const GraphMatchResult saved = RunLoop(options, ranking, &some);
+  const ExplorationResult saved = RunLoop(options, ranking, &some);
   EXPECT_EQ(spent.graph.NumEdges(), 20U);
   EXPECT_EQ(saved.graph.NumEdges(), 20U);
   EXPECT_LE(saved.graph.NumTested(), 20U + 40U * 2U);
@@ -525,7 +527,7 @@ TEST(Loop, HandlesNoneOneAndTwoImages) {
   for (const int num : {0, 1, 2}) {
     const Scene scene = MakeScene(1, num, 1, 0.1, 6);
     RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
-    const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+    const ExplorationResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
     EXPECT_EQ(result.graph.NumEdges(), num == 2 ? 1U : 0U);
     EXPECT_TRUE(result.finished);
   }
@@ -543,13 +545,13 @@ TEST(Loop, EdgesOfOtherMatchersSeedTheGraph) {
   verifier.known.emplace(ids[0], ids[20]);
   GraphMatchOptions options;
   options.number_sample_iterations = 0;
-  const GraphMatchResult result = RunLoop(options, ranking, &verifier);
+  const ExplorationResult result = RunLoop(options, ranking, &verifier);
   // Propagation along the chain alone finds the rest of the place, and nothing of it is tested
   // again.
   EXPECT_EQ(result.graph.NumEdges(), 12U * 11U / 2U);
   EXPECT_EQ(result.num_seed_edges, 11U);
   EXPECT_EQ(result.num_seed_pairs, 12U);
-  EXPECT_EQ(result.propagation.num_tested, 12U * 11U / 2U - 11U);
+  EXPECT_EQ(result.stages[LoopStage::kPropagation].num_tested, 12U * 11U / 2U - 11U);
   for (const ImagePair& pair : verifier.tested) EXPECT_EQ(verifier.known.count(pair), 0U);
 }
 
@@ -587,13 +589,14 @@ TEST(Loop, SecondRunTestsNothing) {
   const VectorRanking ranking = MakeRanking(scene);
   const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
   RecordingVerifier first(edges);
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), ranking, &first);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), ranking, &first);
   RecordingVerifier second(edges);
   second.known.insert(first.tested.begin(), first.tested.end());
-  const GraphMatchResult again = RunLoop(GraphMatchOptions(), ranking, &second);
+  const ExplorationResult again = RunLoop(GraphMatchOptions(), ranking, &second);
   EXPECT_THAT(second.tested, IsEmpty());
   EXPECT_EQ(again.graph.Edges(), result.graph.Edges());
-  EXPECT_EQ((again.sampling + again.propagation).num_known, first.tested.size());
+  EXPECT_EQ((again.stages[LoopStage::kSampling] + again.stages[LoopStage::kPropagation]).num_known,
+            first.tested.size());
   EXPECT_EQ(again.num_seed_pairs, 0U);
 }
 
@@ -611,12 +614,12 @@ TEST(Loop, APairThatFailedIsTheOnlyOneThatTheNextRunTests) {
   ASSERT_NE(bad.id1, 0U);
   RecordingVerifier first(edges);
   first.failing = {bad};
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), ranking, &first);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), ranking, &first);
   EXPECT_THAT(result.failed_pairs, ElementsAre(bad));
   RecordingVerifier second(edges);
   second.known.insert(first.tested.begin(), first.tested.end());
   second.known.erase(bad);
-  const GraphMatchResult again = RunLoop(GraphMatchOptions(), ranking, &second);
+  const ExplorationResult again = RunLoop(GraphMatchOptions(), ranking, &second);
   EXPECT_THAT(second.tested, ElementsAre(bad));
   EXPECT_EQ(again.num_seed_pairs, 0U);
   EXPECT_EQ(again.graph.Edges(), result.graph.Edges());
@@ -650,7 +653,7 @@ TEST(Loop, NewImagesAreSampledAndOldOnesHardly) {
   for (const ImagePair& pair : whole.tested) {
     if (added.count(pair.id1) + added.count(pair.id2) == 0) second.known.insert(pair);
   }
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), ranking, &second);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), ranking, &second);
   std::size_t of_old_images = 0;
   for (const ImagePair& pair : second.tested) {
     of_old_images += added.count(pair.id1) + added.count(pair.id2) == 0 ? 1U : 0U;
@@ -711,7 +714,7 @@ TEST(Loop, ImagesThatWereSampledLeaveSamplingToNewOnes) {
         options.restrictions.frames.insert(options.restrictions.frames.begin() + vertex, 0);
       }
     }
-    const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &second);
+    const ExplorationResult result = RunLoop(options, MakeRanking(scene), &second);
     ASSERT_THAT(second.batches, Not(IsEmpty()));
     for (const ImagePair& pair : second.batches.front()) {
       EXPECT_GT(new_ids.count(pair.id1) + new_ids.count(pair.id2), 0U);
@@ -768,13 +771,13 @@ TEST(Loop, OnlyImagesThatSeekLookForPartners) {
   for (const ImagePair& pair : ImageEdges(scene, ids)) {
     if (seeking_ids.count(pair.id1) + seeking_ids.count(pair.id2) == 0) verifier.known.insert(pair);
   }
-  const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(options, MakeRanking(scene), &verifier);
   EXPECT_THAT(verifier.tested, Not(IsEmpty()));
   for (const ImagePair& pair : verifier.tested) {
     EXPECT_GT(seeking_ids.count(pair.id1) + seeking_ids.count(pair.id2), 0U);
   }
   for (const Vertex vertex : seeking) EXPECT_GT(result.graph.Degree(vertex), 3U);
-  EXPECT_GT(result.propagation.num_tested, 0U);
+  EXPECT_GT(result.stages[LoopStage::kPropagation].num_tested, 0U);
 
   RecordingVerifier exhaustive(ImageEdges(scene, ids));
   VerifyAllPairs(ids, exhaustive, nullptr, options.restrictions);
@@ -793,7 +796,7 @@ TEST(Loop, PairsOfOneFrameAreNotTested) {
   }
   std::size_t num_within = 0;
   RecordingVerifier verifier(ImageEdges(scene, ids));
-  const GraphMatchResult result = RunLoop(options, MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(options, MakeRanking(scene), &verifier);
   for (const ImagePair& pair : verifier.tested) {
     num_within += frames[pair.id1] != 0 && frames[pair.id1] == frames[pair.id2] ? 1U : 0U;
   }
@@ -801,7 +804,7 @@ TEST(Loop, PairsOfOneFrameAreNotTested) {
   // Eight frames of three pairs each are left out; all other edges are found.
   EXPECT_EQ(result.graph.NumEdges(), scene.edges.size() - 8U * 3U);
   RecordingVerifier exhaustive(ImageEdges(scene, ids));
-  const GraphMatchResult all = VerifyAllPairs(ids, exhaustive, nullptr, options.restrictions);
+  const ExplorationResult all = VerifyAllPairs(ids, exhaustive, nullptr, options.restrictions);
   EXPECT_EQ(exhaustive.tested.size(), 48U * 47U / 2U - 8U * 3U);
   EXPECT_EQ(all.graph.NumEdges(), scene.edges.size() - 8U * 3U);
 }
@@ -812,18 +815,20 @@ TEST(Loop, PairsThatCannotBeTestedAreReportedOnceAndAreNoEdges) {
   RecordingVerifier verifier(ImageEdges(scene, ids));
   const ImagePair bad(ids[0], ids[1]);
   verifier.failing = {bad};
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
   EXPECT_THAT(result.failed_pairs, ElementsAre(bad));
   EXPECT_EQ(std::count(verifier.tested.begin(), verifier.tested.end(), bad), 1);
   EXPECT_EQ(result.graph.NumEdges(), scene.edges.size() - 1);
-  EXPECT_EQ((result.sampling + result.propagation).num_failed, 1U);
+  EXPECT_EQ(
+      (result.stages[LoopStage::kSampling] + result.stages[LoopStage::kPropagation]).num_failed,
+      1U);
 }
 
 TEST(Loop, KnownPairsOfUnrankedImagesAreLeftAside) {
   const Scene scene = MakeScene(2, 6, 2, 0.3, 14);
   RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
   verifier.known = {ImagePair(1, 2), ImagePair(7, 8), ImagePair(1000, 2000), ImagePair(10, 10)};
-  const GraphMatchResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
+  const ExplorationResult result = RunLoop(GraphMatchOptions(), MakeRanking(scene), &verifier);
   EXPECT_EQ(result.num_seed_pairs, 0U);
   EXPECT_TRUE(result.finished);
 }
@@ -836,13 +841,13 @@ TEST(Loop, ProgressGrowsAndEndsAtTheResult) {
   ThreadPool threads(2);
   LoopProgress last;
   std::size_t calls = 0;
-  const GraphMatchResult result = RunGraphMatch(GraphMatchOptions(), ranking, ids, verifier,
-                                                threads, [&](const LoopProgress& progress) {
-                                                  EXPECT_GE(progress.num_edges, last.num_edges);
-                                                  EXPECT_EQ(progress.all.num_tested, calls + 1);
-                                                  last = progress;
-                                                  ++calls;
-                                                });
+  const ExplorationResult result = RunGraphMatch(GraphMatchOptions(), ranking, ids, verifier,
+                                                 threads, [&](const LoopProgress& progress) {
+                                                   EXPECT_GE(progress.num_edges, last.num_edges);
+                                                   EXPECT_EQ(progress.all.num_tested, calls + 1);
+                                                   last = progress;
+                                                   ++calls;
+                                                 });
   EXPECT_EQ(calls, verifier.tested.size());
   EXPECT_EQ(last.num_edges, result.graph.NumEdges());
   EXPECT_EQ(last.num_components, result.num_components);
@@ -927,12 +932,12 @@ TEST(Retrieval, TestsTheNearestImagesAndThenNeighborsOfNeighbors) {
         options.num_expansions = num_expansions;
         ThreadPool threads(2);
         RecordingVerifier verifier(ImageEdges(scene, ids));
-        const GraphMatchResult result =
+        const ExplorationResult result =
             RunRetrieval(options, ranking, ids, verifier, threads, nullptr);
         const auto expected = ReferenceRetrieval(options, ranking, scene);
         EXPECT_EQ(AsSets(verifier.batches), expected) << num_images << " " << num_expansions;
-        EXPECT_EQ(result.retrieval.num_tested, expected.front().size());
-        EXPECT_EQ(result.All().num_tested, verifier.tested.size());
+        EXPECT_EQ(result.stages[LoopStage::kRetrieval].num_tested, expected.front().size());
+        EXPECT_EQ(result.stages.All().num_tested, verifier.tested.size());
       }
     }
   }
@@ -947,15 +952,15 @@ TEST(Retrieval, GoesOnAfterAnInterruption) {
   options.num_images = 3;
   options.num_expansions = 4;
   RecordingVerifier whole(ImageEdges(scene, ids));
-  const GraphMatchResult expected = RunRetrieval(options, ranking, ids, whole, threads, nullptr);
-  ASSERT_GT(expected.expansion.num_tested, 10U);
+  const ExplorationResult expected = RunRetrieval(options, ranking, ids, whole, threads, nullptr);
+  ASSERT_GT(expected.stages[LoopStage::kExpansion].num_tested, 10U);
   for (std::size_t stop_after = 0; stop_after < whole.tested.size(); stop_after += 37) {
     RecordingVerifier first(ImageEdges(scene, ids));
     first.stop_after = stop_after;
     EXPECT_FALSE(RunRetrieval(options, ranking, ids, first, threads, nullptr).finished);
     RecordingVerifier second(ImageEdges(scene, ids));
     second.known.insert(first.tested.begin(), first.tested.end());
-    const GraphMatchResult result = RunRetrieval(options, ranking, ids, second, threads, nullptr);
+    const ExplorationResult result = RunRetrieval(options, ranking, ids, second, threads, nullptr);
     EXPECT_EQ(result.graph.Edges(), expected.graph.Edges());
     EXPECT_EQ(first.tested.size() + second.tested.size(), whole.tested.size());
   }
@@ -998,7 +1003,7 @@ TEST(ListedPairs, AllPairsOfTheImagesInBlocks) {
   verifier.known = {ImagePair(1, 4), ImagePair(1, 7), ImagePair(2, 3)};
   std::size_t last_remaining = 0;
   std::size_t calls = 0;
-  const GraphMatchResult result = VerifyAllPairs(ids, verifier, [&](const LoopProgress& progress) {
+  const ExplorationResult result = VerifyAllPairs(ids, verifier, [&](const LoopProgress& progress) {
     EXPECT_EQ(progress.stage, LoopStage::kListed);
     EXPECT_EQ(progress.expected_remaining_tests + ++calls, 600U * 599 / 2);
     last_remaining = progress.expected_remaining_tests;
@@ -1009,9 +1014,9 @@ TEST(ListedPairs, AllPairsOfTheImagesInBlocks) {
             verifier.tested.size());
   EXPECT_EQ(verifier.batches.size(), 6U);
   EXPECT_EQ(result.num_seed_pairs, 0U);
-  EXPECT_EQ(result.listed.num_known, 2U);
-  EXPECT_EQ(result.listed.num_known_edges, 1U);
-  EXPECT_EQ(result.listed.num_tested, verifier.tested.size());
+  EXPECT_EQ(result.stages[LoopStage::kListed].num_known, 2U);
+  EXPECT_EQ(result.stages[LoopStage::kListed].num_known_edges, 1U);
+  EXPECT_EQ(result.stages[LoopStage::kListed].num_tested, verifier.tested.size());
   EXPECT_EQ(result.graph.NumEdges(), 2U);
   EXPECT_EQ(result.num_components, 1U);
   EXPECT_EQ(result.largest_component, 3U);
@@ -1042,12 +1047,12 @@ TEST(ListedPairs, ThoseOfAList) {
   // Twice, known, of an image with itself, and of an image that is not there.
   const std::vector<ImagePair> list = {ImagePair(9, 5), ImagePair(5, 2), ImagePair(2, 5),
                                        ImagePair(9, 2), ImagePair(5, 5), ImagePair(2, 7)};
-  const GraphMatchResult result = VerifyListedPairs(list, {2, 5, 9, 12}, verifier, nullptr);
+  const ExplorationResult result = VerifyListedPairs(list, {2, 5, 9, 12}, verifier, nullptr);
   EXPECT_THAT(verifier.batches,
               ElementsAre(ElementsAre(ImagePair(2, 5), ImagePair(2, 9), ImagePair(5, 9))));
-  EXPECT_EQ(result.listed.num_known, 1U);
-  EXPECT_EQ(result.listed.num_tested, 2U);
-  EXPECT_EQ(result.listed.num_edges, 1U);
+  EXPECT_EQ(result.stages[LoopStage::kListed].num_known, 1U);
+  EXPECT_EQ(result.stages[LoopStage::kListed].num_tested, 2U);
+  EXPECT_EQ(result.stages[LoopStage::kListed].num_edges, 1U);
   EXPECT_EQ(result.num_seed_pairs, 1U);
 }
 

@@ -267,7 +267,7 @@ TEST_F(ReplayTest, TheLogHasEveryTest) {
     num_edges += line.back() == '1' ? 1 : 0;
     quoted = quoted || line.find(",\"with \"\"quotes\"\", and a comma\",") != std::string::npos;
   }
-  EXPECT_EQ(num_tests, result.matching.All().num_tested);
+  EXPECT_EQ(num_tests, result.matching.stages.All().num_tested);
   EXPECT_EQ(num_edges, 60U);
   EXPECT_TRUE(quoted);
   options_.test_log_path = directory_.Path() / "none" / "log.csv";
@@ -323,7 +323,7 @@ TEST_F(ReplayTest, TheReportKnowsEveryImageAndPair) {
   ASSERT_EQ(alone["candidates"].size(), 5U);
   EXPECT_LE(alone["candidates"][0]["distance"], alone["candidates"][1]["distance"]);
   const auto& last = report["discovery"].back();
-  EXPECT_EQ(last["tests"], result.matching.All().num_tested);
+  EXPECT_EQ(last["tests"], result.matching.stages.All().num_tested);
   EXPECT_EQ(last["edges"], 60);
 }
 
@@ -332,7 +332,7 @@ TEST_F(ReplayTest, ABudgetEndsTheRun) {
   const PipelineResult result = Run();
   EXPECT_FALSE(result.matching.finished);
   EXPECT_EQ(result.stopped_by, PipelineResult::StoppedBy::kMaxPairs);
-  EXPECT_EQ(result.matching.All().num_tested, 20U);
+  EXPECT_EQ(result.matching.stages.All().num_tested, 20U);
   EXPECT_GT(result.num_expected_tests_left.value_or(0), 10U);
   // The most promising first: nearly all are edges.
   EXPECT_GE(result.matching.graph.NumEdges(), 18U);

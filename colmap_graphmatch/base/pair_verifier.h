@@ -21,6 +21,8 @@ struct VerifiedPair {
   std::uint32_t num_inliers = 0;
   // Of descriptors, before geometric verification; negative: not known.
   std::int32_t num_matches = -1;
+  // Tested before this run: one of KnownPairs().
+  bool is_known = false;
 };
 
 // The geometric verification of image pairs, as the sample-and-propagate loop sees it

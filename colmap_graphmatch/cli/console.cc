@@ -417,11 +417,11 @@ std::string WithoutControlCharacters(std::string text) {
 
 std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result) {
   if (result.dry_run) return FormatDryRun(result);
-  const GraphMatchResult& matching = result.matching;
+  const ExplorationResult& matching = result.matching;
   const auto num_images =
       static_cast<double>(result.num_images - result.num_images_without_features);
   const double num_possible = num_images * (num_images - 1) / 2;
-  const StageStatistics all = matching.All();
+  const StageStatistics all = matching.stages.All();
   const bool listed = result.listed;
 
   std::string text = FormatImages(result);
@@ -431,11 +431,12 @@ std::string FormatSummary(const PipelineOptions& options, const PipelineResult& 
     text += fmt::format("Already there      {} pairs{}, {} edges\n", matching.num_seed_pairs,
                         listed ? " that are not listed" : "", matching.num_seed_edges);
   }
-  for (const auto& [name, stage] : {std::make_pair("sampling", matching.sampling),
-                                    std::make_pair("propagation", matching.propagation),
-                                    std::make_pair("retrieval", matching.retrieval),
-                                    std::make_pair("expansion", matching.expansion)}) {
-    if (stage.num_tested + stage.num_failed + stage.num_known > 0) text += FormatStage(name, stage);
+  for (const LoopStage stage : kLoopStages) {
+    const StageStatistics& statistics = matching.stages[stage];
+    const bool is_empty = statistics.num_tested + statistics.num_failed + statistics.num_known == 0;
+    // Of listed pairs the sum says all.
+    if (is_empty || stage == LoopStage::kListed) continue;
+    text += FormatStage(StageName(stage), statistics);
   }
   text += FormatStage("all", all);
   if (all.num_tested + all.num_failed == 0 && matching.finished) {

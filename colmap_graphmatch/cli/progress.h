@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/explorer.h"
 
 namespace colmap_graphmatch {
 

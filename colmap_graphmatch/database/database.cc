@@ -436,8 +436,12 @@ std::vector<VerifiedPair> Database::ReadVerifiedPairs(std::size_t min_num_inlier
   std::vector<VerifiedPair> pairs;
   for (const TestedPair& tested : ReadTestedPairs()) {
     const bool is_edge = IsEdge(tested.num_inliers, tested.config, min_num_inliers);
-    pairs.push_back({tested.pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
-                     static_cast<std::uint32_t>(tested.num_inliers)});
+    VerifiedPair verified;
+    verified.pair = tested.pair;
+    verified.outcome = is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge;
+    verified.num_inliers = static_cast<std::uint32_t>(tested.num_inliers);
+    verified.is_known = true;
+    pairs.push_back(verified);
   }
   return pairs;
 }

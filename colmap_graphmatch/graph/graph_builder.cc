@@ -10,7 +10,7 @@
 namespace colmap_graphmatch {
 
 GraphBuilder::GraphBuilder(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                           const std::function<void(const LoopProgress&)>& on_progress)
+                           const OnProgress& on_progress)
     : image_ids_(image_ids),
       verifier_(verifier),
       on_progress_(on_progress),
@@ -61,43 +61,26 @@ bool GraphBuilder::AddSeeds(const std::vector<TestedVertexPair>& seeds) {
   return !seeds.empty();
 }
 
-StageStatistics& GraphBuilder::Total(LoopStage stage) {
-  switch (stage) {
-    case LoopStage::kSampling:
-      return result_.sampling;
-    case LoopStage::kPropagation:
-      return result_.propagation;
-    case LoopStage::kRetrieval:
-      return result_.retrieval;
-    case LoopStage::kExpansion:
-      return result_.expansion;
-    case LoopStage::kListed:
-      break;
-  }
-  return result_.listed;
-}
-
-StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
-                                     const std::vector<VertexPair>& pairs, double num_future_tests,
-                                     double num_future_samples) {
+StageStatistics GraphBuilder::Verify(const Proposal& proposal, const PairProposer& proposer) {
   StageStatistics batch;
-  if (pairs.empty()) return batch;
   const Stopwatch stopwatch;
+  const ExpectedTests after =
+      on_progress_ ? proposer.TestsAfter(proposal, graph_) : ExpectedTests();
   std::vector<ImagePair> image_pairs;
-  image_pairs.reserve(pairs.size());
-  for (const VertexPair& pair : pairs) {
+  image_pairs.reserve(proposal.pairs.size());
+  for (const VertexPair& pair : proposal.pairs) {
     image_pairs.emplace_back(image_ids_[pair.first], image_ids_[pair.second]);
   }
   // Vertices ascend with image ids, so the pairs do too and can be found again by bisection.
   std::vector<TestedVertexPair> tested;
-  tested.reserve(pairs.size());
-  const StageStatistics before = Total(stage);
+  tested.reserve(proposal.pairs.size());
+  StageStatistics& total = result_.stages[proposal.stage];
+  const StageStatistics before = total;
   result_.finished = verifier_.Verify(image_pairs, [&](const VerifiedPair& verified) {
     const auto place = std::lower_bound(image_pairs.begin(), image_pairs.end(), verified.pair);
-    const VertexPair pair = pairs[static_cast<std::size_t>(place - image_pairs.begin())];
+    const VertexPair pair = proposal.pairs[static_cast<std::size_t>(place - image_pairs.begin())];
     const bool is_edge = verified.outcome == PairOutcome::kEdge;
-    const bool is_known = FindPair(verifier_.KnownPairs(), verified.pair) != nullptr;
-    if (is_known) {
+    if (verified.is_known) {
       ++batch.num_known;
       if (is_edge) ++batch.num_known_edges;
     } else if (verified.outcome == PairOutcome::kFailed) {
@@ -110,38 +93,47 @@ StageStatistics GraphBuilder::Verify(LoopStage stage, int iteration,
     if (is_edge) components_.AddEdge(pair);
     tested.push_back({pair, is_edge});
     batch.seconds = stopwatch.Seconds();
-    Total(stage) = before + batch;
+    total = before + batch;
     LoopProgress progress;
-    progress.stage = stage;
-    progress.iteration = iteration;
+    progress.stage = proposal.stage;
+    progress.iteration = proposal.iteration;
     progress.last = verified;
-    progress.last_is_known = is_known;
-    const auto num_left = static_cast<double>(pairs.size() - tested.size());
-    progress.expected_remaining_samples = static_cast<std::size_t>(
-        num_future_samples + (stage == LoopStage::kSampling ? num_left : 0));
-    Report(progress, batch.num_edges + batch.num_known_edges, num_left + num_future_tests);
+    const auto num_left = static_cast<double>(proposal.pairs.size() - tested.size());
+    const bool is_sampling = proposal.stage == LoopStage::kSampling;
+    progress.expected_remaining_samples =
+        static_cast<std::size_t>(after.samples + (is_sampling ? num_left : 0));
+    progress.expected_remaining_tests = static_cast<std::size_t>(num_left + after.all);
+    Report(progress, batch.num_edges + batch.num_known_edges);
   });
   batch.seconds = stopwatch.Seconds();
-  Total(stage) = before + batch;
+  total = before + batch;
+  KeepIteration(proposal, batch);
   std::sort(tested.begin(), tested.end(),
             [](const TestedVertexPair& a, const TestedVertexPair& b) { return a.pair < b.pair; });
   graph_.Add(tested);
   return batch;
 }
 
-void GraphBuilder::Report(LoopProgress progress, std::size_t num_edges_in_batch,
-                          double num_remaining_tests) {
+void GraphBuilder::KeepIteration(const Proposal& proposal, const StageStatistics& batch) {
+  if (proposal.stage != LoopStage::kSampling && proposal.stage != LoopStage::kPropagation) return;
+  std::vector<IterationStatistics>& iterations = result_.iterations;
+  if (iterations.empty() || iterations.back().iteration != proposal.iteration) {
+    iterations.push_back({proposal.iteration, {}});
+  }
+  iterations.back().stages[proposal.stage] = batch;
+}
+
+void GraphBuilder::Report(LoopProgress progress, std::size_t num_edges_in_batch) {
   if (!on_progress_) return;
-  progress.all = result_.All();
+  progress.all = result_.stages.All();
   progress.num_edges = graph_.NumEdges() + num_edges_in_batch;
   progress.num_components = components_.Count();
   progress.largest_component = components_.Largest();
   progress.num_isolated = components_.NumIsolated();
-  progress.expected_remaining_tests = static_cast<std::size_t>(num_remaining_tests);
   on_progress_(progress);
 }
 
-GraphMatchResult GraphBuilder::Finish() {
+ExplorationResult GraphBuilder::Finish() {
   result_.graph = std::move(graph_);
   result_.num_components = components_.Count();
   result_.largest_component = components_.Largest();

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/graph/components.h"
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
 
 namespace colmap_graphmatch {
@@ -16,7 +15,7 @@ class GraphBuilder {
  public:
   // image_ids: the image of every vertex, ascending. Throws OptionsError if they are not.
   GraphBuilder(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-               const std::function<void(const LoopProgress&)>& on_progress);
+               const OnProgress& on_progress);
 
   const MatchingGraph& Graph() const { return graph_; }
 
@@ -25,31 +24,27 @@ class GraphBuilder {
   bool AddKnown();
   bool AddKnown(const std::vector<ImagePair>& pairs);
 
-  std::size_t NumKnownOutsideGraph() const { return KnownOutsideGraph().size(); }
-
-  // Has the pairs, which are ascending and none of which is in the graph, tested, and adds them.
-  // Returns the statistics of this batch alone.
-  StageStatistics Verify(LoopStage stage, int iteration, const std::vector<VertexPair>& pairs,
-                         double num_future_tests, double num_future_samples = 0);
+  // Has the proposed pairs tested, and adds them. Returns the statistics of this batch alone.
+  StageStatistics Verify(const Proposal& proposal, const PairProposer& proposer);
 
   // False once the verifier was asked to stop: nothing more is to be verified.
   bool Continues() const { return result_.finished; }
 
   // What was found. The builder is of no use after it.
-  GraphMatchResult Finish();
+  ExplorationResult Finish();
 
  private:
   std::vector<TestedVertexPair> KnownOutsideGraph() const;
   bool AddSeeds(const std::vector<TestedVertexPair>& seeds);
-  StageStatistics& Total(LoopStage stage);
-  void Report(LoopProgress progress, std::size_t num_edges_in_batch, double num_remaining_tests);
+  void KeepIteration(const Proposal& proposal, const StageStatistics& batch);
+  void Report(LoopProgress progress, std::size_t num_edges_in_batch);
 
   const std::vector<ImageId>& image_ids_;
   PairVerifier& verifier_;
-  const std::function<void(const LoopProgress&)>& on_progress_;
+  const OnProgress& on_progress_;
   MatchingGraph graph_;
   Components components_;
-  GraphMatchResult result_;
+  ExplorationResult result_;
 };
 
 }  // namespace colmap_graphmatch

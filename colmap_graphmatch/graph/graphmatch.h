@@ -1,7 +1,6 @@
 #pragma once
 
-#include <cstddef>
-#include <functional>
+#include <optional>
 #include <vector>
 
 #include "colmap_graphmatch/base/pair_verifier.h"
@@ -9,75 +8,36 @@
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
 #include "colmap_graphmatch/graph/options.h"
+#include "colmap_graphmatch/graph/pair_proposer.h"
+#include "colmap_graphmatch/graph/remaining_tests.h"
+#include "colmap_graphmatch/graph/sampling.h"
+#include "colmap_graphmatch/graph/stages.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 
 namespace colmap_graphmatch {
 
-// kSampling, kPropagation: of the loop. kListed: the pairs were given beforehand (listed_pairs.h).
-// kRetrieval, kExpansion: see retrieval.h.
-enum class LoopStage { kSampling, kPropagation, kListed, kRetrieval, kExpansion };
+// The paper's loop (GraphMatch, section 3; the pseudo-code is in docs/design.md): sampling and
+// propagation take turns until neither proposes anything.
+class GraphMatchProposer : public PairProposer {
+ public:
+  // ranking and threads must outlive it. Throws OptionsError.
+  GraphMatchProposer(const GraphMatchOptions& options, const Ranking& ranking, ThreadPool& threads);
 
-// The lower-case word for a stage in logs and reports.
-const char* StageName(LoopStage stage);
+  std::optional<Proposal> Next(const MatchingGraph& graph) override;
+  void OnTested(const StageStatistics& batch) override;
+  void OnKnown(const MatchingGraph& graph) override { sampler_.ChargeTested(graph); }
+  ExpectedTests TestsAfter(const Proposal& proposal, const MatchingGraph& graph) const override;
 
-struct StageStatistics {
-  std::size_t num_tested = 0;  // Pairs that the verifier tested in this run.
-  std::size_t num_edges = 0;   // Those of them that passed.
-  std::size_t num_failed = 0;  // Pairs that the verifier could not test.
-  std::size_t num_known = 0;   // Pairs asked for that earlier runs had tested.
-  std::size_t num_known_edges = 0;
-  double seconds = 0;
+ private:
+  std::vector<VertexPair> Sample(const MatchingGraph& graph);
 
-  // Edges found / pairs tested, 0 without tests.
-  double Efficiency() const {
-    return num_tested == 0 ? 0 : static_cast<double>(num_edges) / static_cast<double>(num_tested);
-  }
-};
-
-StageStatistics operator+(const StageStatistics& a, const StageStatistics& b);
-
-struct IterationStatistics {
-  int iteration = 0;  // Counted from 0; those without a test are left out.
-  StageStatistics sampling;
-  StageStatistics propagation;
-};
-
-// The state of the loop after a pair was verified.
-struct LoopProgress {
-  LoopStage stage = LoopStage::kSampling;
-  int iteration = 0;
-  VerifiedPair last;           // The pair,
-  bool last_is_known = false;  // which an earlier run had tested.
-  StageStatistics all;         // Of all stages together.
-  std::size_t num_edges = 0;   // Of the whole graph, those of earlier runs included.
-  std::size_t num_components = 0;
-  std::size_t largest_component = 0;
-  std::size_t num_isolated = 0;
-  // An estimate of the tests to come. In the loop: sampling goes on at its pace, and propagation
-  // tests what it could propose now and what the edges among that lead to (docs/benchmarks.md says
-  // how good it is).
-  std::size_t expected_remaining_tests = 0;
-  std::size_t expected_remaining_samples = 0;  // Those of them that sampling draws.
-};
-
-struct GraphMatchResult {
-  MatchingGraph graph{0};
-  std::vector<IterationStatistics> iterations;
-  StageStatistics sampling;
-  StageStatistics propagation;
-  StageStatistics listed;
-  StageStatistics retrieval;
-  StageStatistics expansion;
-  // Pairs that were in the database before the run and that the loop did not ask for itself.
-  std::size_t num_seed_pairs = 0;
-  std::size_t num_seed_edges = 0;
-  std::size_t num_components = 0;
-  std::size_t largest_component = 0;
-  std::size_t num_isolated = 0;
-  std::vector<ImagePair> failed_pairs;
-  bool finished = true;  // False if the verifier was asked to stop.
-
-  StageStatistics All() const { return sampling + propagation + listed + retrieval + expansion; }
+  const GraphMatchOptions options_;
+  const Ranking& ranking_;
+  ThreadPool& threads_;
+  Sampler sampler_;
+  RemainingTests remaining_;
+  LoopStage stage_ = LoopStage::kPropagation;  // Of the last proposal, or of none.
+  int iteration_ = -1;
 };
 
 // Finds out which known pairs have to be part of the graph from the start, so that what earlier
@@ -91,23 +51,5 @@ std::vector<ImagePair> ChooseSeeds(const GraphMatchOptions& options, const Ranki
                                    const std::vector<ImageId>& image_ids,
                                    const PairVerifier& verifier, ThreadPool& threads,
                                    const std::vector<ImagePair>& earlier_seeds);
-
-// The sample-and-propagate loop (GraphMatch, section 3; the pseudo-code is in docs/design.md).
-// image_ids gives the image of every vertex of the ranking, ascending. Known pairs that are neither
-// seeds nor asked for join the graph when nothing else is left to test.
-//
-// The tested pairs depend on the options, the ranking and the verifier's answers alone. Exceptions
-// of the verifier pass through.
-GraphMatchResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
-                               const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                               ThreadPool& threads,
-                               const std::function<void(const LoopProgress&)>& on_progress,
-                               const std::vector<ImagePair>& seeds);
-
-// The same with the seeds that ChooseSeeds finds without earlier ones.
-GraphMatchResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
-                               const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                               ThreadPool& threads,
-                               const std::function<void(const LoopProgress&)>& on_progress);
 
 }  // namespace colmap_graphmatch

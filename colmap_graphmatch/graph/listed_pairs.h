@@ -1,27 +1,47 @@
 #pragma once
 
-#include <functional>
+#include <cstddef>
+#include <optional>
 #include <vector>
 
-#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/types.h"
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/pair_proposer.h"
+#include "colmap_graphmatch/graph/pair_restrictions.h"
 
 namespace colmap_graphmatch {
 
-// Has pairs tested that are given beforehand instead of found by sampling and propagation: all
-// pairs of the images, block of images by block of images, or those of a list. Known pairs are
-// asked for like all others, in the same batches, so that a run that goes on after an interruption
-// ends like one that was not interrupted; those that were not asked for are added to the graph in
-// the end. image_ids: ascending; pairs of other images, pairs of an image with itself,
-// repeated pairs and those that the restrictions do not allow are left out. Memory grows with the
-// number of tested pairs. Exceptions of the verifier pass through.
-GraphMatchResult VerifyAllPairs(const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                                const std::function<void(const LoopProgress&)>& on_progress,
-                                const PairRestrictions& restrictions = {});
-GraphMatchResult VerifyListedPairs(const std::vector<ImagePair>& pairs,
-                                   const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                                   const std::function<void(const LoopProgress&)>& on_progress,
-                                   const PairRestrictions& restrictions = {});
+// Pairs that are given beforehand instead of found. Known pairs are asked for like all others, in
+// the same batches, so that a run that goes on after an interruption ends like one that was not
+// interrupted. Pairs that the restrictions do not allow are left out.
+
+// All pairs of the vertices, block by block.
+class AllPairsProposer : public PairProposer {
+ public:
+  explicit AllPairsProposer(const PairRestrictions& restrictions) : restrictions_(restrictions) {}
+
+  std::optional<Proposal> Next(const MatchingGraph& graph) override;
+  ExpectedTests TestsAfter(const Proposal& proposal, const MatchingGraph& graph) const override;
+
+ private:
+  PairRestrictions restrictions_;
+  // The first vertices of the two sides of the next block.
+  std::size_t first_a_ = 0;
+  std::size_t first_b_ = 0;
+  double num_gone_ = 0;  // Pairs of the blocks before, allowed or not.
+};
+
+// The pairs of a list, in one batch. Pairs of images that have no vertex, pairs of an image with
+// itself and repeated pairs are left out.
+class ListedPairsProposer : public PairProposer {
+ public:
+  // image_ids: the image of every vertex, ascending.
+  ListedPairsProposer(const std::vector<ImagePair>& pairs, const std::vector<ImageId>& image_ids,
+                      const PairRestrictions& restrictions);
+
+  std::optional<Proposal> Next(const MatchingGraph& graph) override;
+
+ private:
+  std::vector<VertexPair> pairs_;  // Ascending, until they are proposed.
+};
 
 }  // namespace colmap_graphmatch

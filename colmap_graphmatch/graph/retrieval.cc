@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/graph/graph_builder.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -57,31 +57,38 @@ std::vector<VertexPair> RetrievePairs(const RetrievalOptions& options, const Ran
                });
 }
 
-GraphMatchResult RunRetrieval(const RetrievalOptions& options, const Ranking& ranking,
-                              const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                              ThreadPool& threads,
-                              const std::function<void(const LoopProgress&)>& on_progress) {
+RetrievalProposer::RetrievalProposer(const RetrievalOptions& options, const Ranking& ranking,
+                                     ThreadPool& threads)
+    : options_(options), ranking_(ranking), threads_(threads) {
   options.Check();
-  const std::size_t num_vertices = ranking.NumVertices();
-  if (image_ids.size() != num_vertices) throw OptionsError("Every ranked image needs its id.");
-  GraphBuilder builder(image_ids, verifier, on_progress);
-  builder.Verify(LoopStage::kRetrieval, 0, RetrievePairs(options, ranking, threads), 0);
-  for (int round = 0; round < options.num_expansions && builder.Continues(); ++round) {
-    const MatchingGraph& graph = builder.Graph();
-    const std::vector<VertexPair> expanded =
-        Unite(num_vertices, options.restrictions, threads,
-              [&](Vertex vertex, std::vector<Vertex>* partners) {
-                for (const Vertex neighbor : graph.Neighbors(vertex)) {
-                  for (const Vertex other : graph.Neighbors(neighbor)) {
-                    if (!graph.IsTested(vertex, other)) partners->push_back(other);
-                  }
-                }
-              });
-    if (expanded.empty()) break;
-    builder.Verify(LoopStage::kExpansion, round, expanded, 0);
+}
+
+std::vector<VertexPair> RetrievalProposer::Expand(const MatchingGraph& graph) const {
+  return Unite(graph.NumVertices(), options_.restrictions, threads_,
+               [&](Vertex vertex, std::vector<Vertex>* partners) {
+                 for (const Vertex neighbor : graph.Neighbors(vertex)) {
+                   for (const Vertex other : graph.Neighbors(neighbor)) {
+                     if (!graph.IsTested(vertex, other)) partners->push_back(other);
+                   }
+                 }
+               });
+}
+
+std::optional<Proposal> RetrievalProposer::Next(const MatchingGraph& graph) {
+  if (graph.NumVertices() != ranking_.NumVertices()) {
+    throw OptionsError("Every ranked image needs its id.");
   }
-  builder.AddKnown();
-  return builder.Finish();
+  if (round_ > options_.num_expansions) return std::nullopt;
+  const int round = round_++;
+  std::vector<VertexPair> pairs =
+      round == 0 ? RetrievePairs(options_, ranking_, threads_) : Expand(graph);
+  if (!pairs.empty()) {
+    return round == 0 ? Proposal{std::move(pairs), LoopStage::kRetrieval, 0}
+                      : Proposal{std::move(pairs), LoopStage::kExpansion, round - 1};
+  }
+  // Nothing was found to expand, and nothing will be.
+  round_ = options_.num_expansions + 1;
+  return std::nullopt;
 }
 
 }  // namespace colmap_graphmatch

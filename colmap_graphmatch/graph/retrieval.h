@@ -1,12 +1,11 @@
 #pragma once
 
-#include <functional>
+#include <optional>
 #include <vector>
 
-#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/thread_pool.h"
-#include "colmap_graphmatch/base/types.h"
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/pair_proposer.h"
 #include "colmap_graphmatch/graph/pair_restrictions.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 
@@ -31,16 +30,25 @@ struct RetrievalOptions {
 std::vector<VertexPair> RetrievePairs(const RetrievalOptions& options, const Ranking& ranking,
                                       ThreadPool& threads);
 
-// The rivals of the paper (GraphMatch, section 4): every image is tested with its nearest ones, all
-// in one batch; then, in each round of query expansion, with the neighbours of its neighbours in
-// the graph that was found before (Agarwal et al., Building Rome in a Day, ICCV 2009, section 3.3:
-// if i and k match j, i and k are tested). image_ids gives the image of every vertex, ascending.
-// Known pairs are asked for like all others, in the same batches, so that an interrupted run ends
-// like one that was not; those not asked for join the graph in the end. Exceptions of the verifier
-// pass through.
-GraphMatchResult RunRetrieval(const RetrievalOptions& options, const Ranking& ranking,
-                              const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                              ThreadPool& threads,
-                              const std::function<void(const LoopProgress&)>& on_progress);
+// The rivals of the paper (GraphMatch, section 4): every image with its nearest ones, all in one
+// batch; then, in each round of query expansion, with the neighbours of its neighbours in the graph
+// that was found before (Agarwal et al., Building Rome in a Day, ICCV 2009, section 3.3: if i and k
+// match j, i and k are tested). Known pairs are asked for like all others, in the same batches, so
+// that an interrupted run ends like one that was not.
+class RetrievalProposer : public PairProposer {
+ public:
+  // ranking and threads must outlive it. Throws OptionsError.
+  RetrievalProposer(const RetrievalOptions& options, const Ranking& ranking, ThreadPool& threads);
+
+  std::optional<Proposal> Next(const MatchingGraph& graph) override;
+
+ private:
+  std::vector<VertexPair> Expand(const MatchingGraph& graph) const;
+
+  const RetrievalOptions options_;
+  const Ranking& ranking_;
+  ThreadPool& threads_;
+  int round_ = 0;  // 0: retrieval.
+};
 
 }  // namespace colmap_graphmatch

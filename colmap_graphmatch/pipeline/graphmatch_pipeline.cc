@@ -10,16 +10,17 @@
 #include <utility>
 #include <vector>
 
-#include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/listed_pairs.h"
 #include "colmap_graphmatch/matching/top_two.h"
 #include "colmap_graphmatch/pipeline/finished_graph.h"
 #include "colmap_graphmatch/pipeline/image_ranking.h"
 #include "colmap_graphmatch/pipeline/pair_list.h"
 #include "colmap_graphmatch/pipeline/run_state.h"
+#include "colmap_graphmatch/pipeline/strategy.h"
 #include "colmap_graphmatch/pipeline/test_log.h"
 #include "colmap_graphmatch/pipeline/timed.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
@@ -28,137 +29,14 @@
 namespace colmap_graphmatch {
 namespace {
 
+// An image without an edge is explained by so many candidates.
+constexpr std::size_t kMaxCandidatesInReport = 5;
+
 std::vector<ImageId> Ids(const std::vector<ImageRecord>& images) {
   std::vector<ImageId> ids;
   ids.reserve(images.size());
   for (const ImageRecord& image : images) ids.push_back(image.id);
   return ids;
-}
-
-// What the seeds of a loop depend on, apart from the images and their vectors.
-std::string LoopKey(const PipelineOptions& options, const GraphMatchOptions& graph) {
-  return "loop: " + graph.Key() + ", inliers " +
-         std::to_string(options.verification.min_num_inliers);
-}
-
-bool RetrievesOnce(PipelineOptions::Strategy strategy) {
-  return strategy == PipelineOptions::Strategy::kRetrieval ||
-         strategy == PipelineOptions::Strategy::kBriad;
-}
-
-RetrievalOptions MakeRetrievalOptions(const PipelineOptions& options) {
-  const bool expands = options.strategy == PipelineOptions::Strategy::kBriad;
-  RetrievalOptions retrieval;
-  retrieval.num_images = options.num_retrieved_images > 0 ? options.num_retrieved_images
-                         : expands                        ? 40
-                                                          : 120;
-  retrieval.num_expansions = expands ? options.num_expansions : 0;
-  return retrieval;
-}
-
-GraphMatchOptions MakeGraphOptions(const PipelineOptions& options) {
-  GraphMatchOptions graph = options.graph;
-  if (options.strategy == PipelineOptions::Strategy::kSampling) graph.num_to_propagate = 0;
-  if (options.strategy == PipelineOptions::Strategy::kPropagation) {
-    graph.number_sample_iterations = std::min(graph.number_sample_iterations, 1);
-  }
-  return graph;
-}
-
-std::vector<ImagePair> ReadListedPairs(const std::filesystem::path& path,
-                                       const std::vector<ImageRecord>& images,
-                                       const StopRequest& stop, PipelineObserver& observer) {
-  PairList list = ReadPairList(path, images, &stop);
-  WarnOfSkippedLines(list, path, "two different images", observer);
-  return std::move(list.pairs);
-}
-
-}  // namespace
-
-void PipelineOptions::Check() const {
-  if (!match_list_path.empty() && strategy != Strategy::kGraphMatch) {
-    throw OptionsError(
-        "--GraphMatching.match_list_path and --GraphMatching.strategy contradict each other: give "
-        "one of them.");
-  }
-  if (!match_list_path.empty() && !image_list_path.empty()) {
-    throw OptionsError(
-        "--GraphMatching.match_list_path lists pairs, --VocabTreeMatching.match_list_path images "
-        "that look for partners: give one of them.");
-  }
-  const bool ranks = match_list_path.empty() && strategy != Strategy::kExhaustive;
-  if (!ranks && (!ranking.ranking_path.empty() || !ranking.export_path.empty() ||
-                 !ranking.vectors.vectors_path.empty())) {
-    throw OptionsError(
-        "--GraphMatching.ranking_path, --GraphMatching.vectors_path and "
-        "--GraphMatching.export_vectors need a strategy that ranks images; a list of pairs and the "
-        "strategy exhaustive do not.");
-  }
-  EffectiveNumThreads(num_threads);
-  if (num_retrieved_images < 0) {
-    throw OptionsError("num_retrieved_images is " + std::to_string(num_retrieved_images) +
-                       "; it must be positive, or 0 to have it chosen.");
-  }
-  if (dry_run && (!ranks || !replay_path.empty())) {
-    throw OptionsError(
-        "--GraphMatching.dry_run shows which pairs a strategy that ranks images would test first; "
-        "with a list of pairs, the strategy exhaustive or --GraphMatching.replay_path there is "
-        "nothing to show.");
-  }
-  MakeRetrievalOptions(*this).Check();
-  budget.Check();
-  ranking.Check();
-  graph.Check();
-  verification.Check();
-}
-
-namespace {
-
-// What is known of the job before it is known how pairs are verified.
-struct Job {
-  const PipelineOptions& options;
-  const StopRequest& stop;
-  PipelineObserver& observer;
-  ThreadPool& threads;
-  Database& database;
-  RunState& state;
-  const std::vector<ImageRecord>& all_images;
-  const std::vector<ImageRecord>& images;             // Those with features,
-  const std::vector<ImageFingerprint>& fingerprints;  // and of which.
-  std::vector<ImagePair> listed_pairs;                // Of match_list_path.
-  std::vector<ImageId> seeking;                       // Of image_list_path.
-  std::function<double()> seconds;                    // Since the start of the run.
-};
-
-using OnProgress = std::function<void(const LoopProgress&)>;
-
-// An image without an edge is explained by so many candidates.
-constexpr std::size_t kMaxCandidatesInReport = 5;
-
-PairRestrictions FindRestrictions(const Job& job, const std::vector<ImageRecord>& images) {
-  PairRestrictions restrictions;
-  if (!job.seeking.empty()) {
-    for (const ImageRecord& image : images) {
-      restrictions.seeking.push_back(
-          std::binary_search(job.seeking.begin(), job.seeking.end(), image.id));
-    }
-  }
-  if (job.options.skip_image_pairs_in_same_frame) {
-    const std::map<ImageId, std::uint32_t> frames = job.database.ReadFrames();
-    for (const ImageRecord& image : images) {
-      const auto frame = frames.find(image.id);
-      restrictions.frames.push_back(frame == frames.end() ? 0 : frame->second);
-    }
-  }
-  return restrictions;
-}
-
-RankedImages Rank(const Job& job, const std::vector<VerifiedPair>& known, PipelineResult* result) {
-  ImageRankingOptions options = job.options.ranking;
-  options.vectors.seed = job.options.seed;
-  options.vectors.gmm.seed = job.options.seed;
-  return RankImages(options, job.database, job.images, job.fingerprints, known, job.state,
-                    job.threads, job.stop, job.observer, &result->preprocessing_seconds);
 }
 
 // Lists that are cut short by a budget are taken from their beginning.
@@ -177,148 +55,290 @@ BudgetedVerifier::Order OrderOfRanking(const Ranking& ranking, const std::vector
   };
 }
 
-// Tests pairs with test(verifier) as long as the budget lasts.
-template <typename Test>
-GraphMatchResult TestWithinBudget(const Job& job, PairVerifier& verifier,
-                                  const BudgetedVerifier::Order& order, PipelineResult* result,
-                                  const Test& test) {
-  BudgetedVerifier budgeted(verifier, job.options.budget, job.threads.NumThreads(), job.seconds,
-                            order);
-  GraphMatchResult matching =
-      Timed(&result->matching_seconds, [&]() -> GraphMatchResult { return test(budgeted); });
-  if (!matching.finished) {
+// One run, step by step.
+class Pipeline {
+ public:
+  Pipeline(const PipelineOptions& options, const StopRequest& stop, PipelineObserver& observer)
+      : options_(options), stop_(stop), observer_(observer), threads_(options.num_threads) {
+    result_.replayed = !options.replay_path.empty();
+    result_.listed = !options.match_list_path.empty() ||
+                     options.strategy == PipelineOptions::Strategy::kExhaustive;
+    result_.dry_run = options.dry_run;
+    result_.num_threads = threads_.NumThreads();
+  }
+
+  PipelineResult Run() {
+    WarnOfFewThreads();
+    OpenDatabase();
+    ReadLists();
+    if (options_.dry_run) {
+      FindCandidates();
+    } else if (result_.replayed) {
+      Replay();
+    } else {
+      MatchAndVerify();
+    }
+    if (log_) log_->Close();
+    result_.total_seconds = total_.Seconds();
+    return std::move(result_);
+  }
+
+ private:
+  void WarnOfFewThreads();
+  void OpenDatabase();
+  void ReadLists();
+  void FindCandidates();
+  void Replay();
+  void MatchAndVerify();
+
+  // Learns, encodes and ranks.
+  void Rank(const std::vector<VerifiedPair>& known);
+  // Has tested what the strategy proposes.
+  void ExploreWith(PairVerifier& verifier);
+
+  PairRestrictions FindRestrictions(const std::vector<ImageRecord>& images);
+  std::unique_ptr<PairProposer> MakeProposer(const std::vector<ImageId>& ids,
+                                             const PairRestrictions& restrictions);
+  KnownPairsPolicy ChooseKnown(const std::vector<ImageId>& ids,
+                               const PairRestrictions& restrictions, const PairVerifier& verifier);
+  BudgetedVerifier::Order OrderOfTests(const std::vector<ImageId>& ids) const;
+  void OnProgress(const LoopProgress& progress);
+  void KeepDetails(const PairVerifier& verifier, const std::vector<ImageId>& ids);
+
+  const PipelineOptions& options_;
+  const StopRequest& stop_;
+  PipelineObserver& observer_;
+  Stopwatch total_;
+  ThreadPool threads_;
+  PipelineResult result_;
+
+  std::optional<Database> database_;
+  RunState state_;
+  std::vector<ImageRecord> all_images_;
+  std::vector<ImageRecord> images_;             // Those with features,
+  std::vector<ImageFingerprint> fingerprints_;  // and of which.
+  std::vector<ImagePair> listed_pairs_;         // Of match_list_path.
+  std::vector<ImageId> seeking_;                // Of image_list_path.
+  RankedImages ranked_;                         // Nothing, if pairs are listed.
+
+  std::function<double()> seconds_ = [this] { return total_.Seconds(); };  // Since the start.
+  RunRecord record_;
+  std::optional<TestLog> log_;
+};
+
+void Pipeline::WarnOfFewThreads() {
+  const int num_wanted = EffectiveNumThreads(options_.num_threads);
+  if (threads_.NumThreads() >= num_wanted) return;
+  observer_.OnWarning("The system lets this program start fewer threads than the " +
+                      std::to_string(num_wanted) +
+                      " that are wanted (ulimit -u, or a limit of the container): it works with "
+                      "what it gets, and is slower.");
+}
+
+void Pipeline::OpenDatabase() {
+  const bool reads_only = result_.replayed || options_.dry_run;
+  const sqlite::LockPatience patience(options_.verification.lock_timeout, &stop_);
+  database_.emplace(options_.database_path,
+                    reads_only ? sqlite::Access::kRead : sqlite::Access::kReadWrite, patience);
+  all_images_ = database_->ReadImages();
+  if (!reads_only) database_->CheckWritable();
+  // Nothing of a replay is for the next run on these photos.
+  if (!result_.replayed) {
+    state_ = RunState(
+        options_.database_path, patience,
+        [this](const std::string& message) { observer_.OnInfo(message); },
+        [this](const std::string& warning) { observer_.OnWarning(warning); });
+  }
+  images_ = WithFeatures(all_images_);
+  fingerprints_ = database_->ReadFingerprints(images_);
+  database_->ExpectFeatures(images_, fingerprints_);
+  result_.num_images = all_images_.size();
+  result_.num_images_without_features = all_images_.size() - images_.size();
+  if (images_.size() < all_images_.size()) {
+    observer_.OnWarning(std::to_string(result_.num_images_without_features) + " of " +
+                        std::to_string(all_images_.size()) +
+                        " images have no features and cannot be matched.");
+  }
+  if (images_.size() == 1) {
+    observer_.OnWarning("Only one image has features: there is no pair to test.");
+  }
+}
+
+void Pipeline::ReadLists() {
+  if (!options_.test_log_path.empty()) log_.emplace(options_.test_log_path, all_images_);
+  if (!options_.match_list_path.empty()) {
+    PairList list = ReadPairList(options_.match_list_path, all_images_, &stop_);
+    WarnOfSkippedLines(list, options_.match_list_path, "two different images", observer_);
+    listed_pairs_ = std::move(list.pairs);
+  }
+  if (!options_.image_list_path.empty()) {
+    ImageList list = ReadImageList(options_.image_list_path, images_, &stop_);
+    WarnOfSkippedLines(list, options_.image_list_path, "an image", observer_);
+    seeking_ = std::move(list.images);
+  }
+}
+
+void Pipeline::Rank(const std::vector<VerifiedPair>& known) {
+  ImageRankingOptions options = options_.ranking;
+  options.vectors.seed = options_.seed;
+  options.vectors.gmm.seed = options_.seed;
+  ranked_ = RankImages(options, *database_, images_, fingerprints_, known, state_, threads_, stop_,
+                       observer_, &result_.preprocessing_seconds);
+}
+
+PairRestrictions Pipeline::FindRestrictions(const std::vector<ImageRecord>& images) {
+  PairRestrictions restrictions;
+  if (!seeking_.empty()) {
+    for (const ImageRecord& image : images) {
+      restrictions.seeking.push_back(
+          std::binary_search(seeking_.begin(), seeking_.end(), image.id));
+    }
+  }
+  if (options_.skip_image_pairs_in_same_frame) {
+    const std::map<ImageId, std::uint32_t> frames = database_->ReadFrames();
+    for (const ImageRecord& image : images) {
+      const auto frame = frames.find(image.id);
+      restrictions.frames.push_back(frame == frames.end() ? 0 : frame->second);
+    }
+  }
+  return restrictions;
+}
+
+std::unique_ptr<PairProposer> Pipeline::MakeProposer(const std::vector<ImageId>& ids,
+                                                     const PairRestrictions& restrictions) {
+  if (!options_.match_list_path.empty()) {
+    return std::make_unique<ListedPairsProposer>(listed_pairs_, ids, restrictions);
+  }
+  if (result_.listed) return std::make_unique<AllPairsProposer>(restrictions);
+  return MakeRankingProposer(options_, restrictions, *ranked_.ranking, threads_);
+}
+
+KnownPairsPolicy Pipeline::ChooseKnown(const std::vector<ImageId>& ids,
+                                       const PairRestrictions& restrictions,
+                                       const PairVerifier& verifier) {
+  KnownPairsPolicy known;
+  if (result_.listed || result_.replayed || !IsLoop(options_.strategy)) return known;
+  GraphMatchOptions graph = LoopOptionsOf(options_);
+  graph.restrictions = restrictions;
+  const std::string key = LoopKey(options_, restrictions);
+  known.seeds =
+      ChooseSeeds(graph, *ranked_.ranking, ids, verifier, threads_, state_.ReadSeeds(key));
+  state_.KeepSeeds(key, known.seeds);
+  return known;
+}
+
+BudgetedVerifier::Order Pipeline::OrderOfTests(const std::vector<ImageId>& ids) const {
+  if (!result_.listed) return OrderOfRanking(*ranked_.ranking, ids);
+  if (listed_pairs_.empty() || options_.budget.IsUnlimited()) return {};
+  return OrderOfList(listed_pairs_);
+}
+
+void Pipeline::ExploreWith(PairVerifier& verifier) {
+  if (!result_.listed) Rank(verifier.KnownPairs());
+  const std::vector<ImageRecord>& images = result_.listed ? images_ : ranked_.images;
+  const std::vector<ImageId> ids = Ids(images);
+  const PairRestrictions restrictions = FindRestrictions(images);
+  BudgetedVerifier budgeted(verifier, options_.budget, threads_.NumThreads(), seconds_,
+                            OrderOfTests(ids));
+  result_.matching = Timed(&result_.matching_seconds, [&] {
+    const std::unique_ptr<PairProposer> proposer = MakeProposer(ids, restrictions);
+    const KnownPairsPolicy known = ChooseKnown(ids, restrictions, verifier);
+    return Explore(
+        *proposer, ids, budgeted, [this](const LoopProgress& progress) { OnProgress(progress); },
+        known);
+  });
+  if (!result_.matching.finished) {
     using Limit = BudgetedVerifier::Limit;
     using StoppedBy = PipelineResult::StoppedBy;
-    result->stopped_by = budgeted.Reached() == Limit::kMaxPairs     ? StoppedBy::kMaxPairs
+    result_.stopped_by = budgeted.Reached() == Limit::kMaxPairs     ? StoppedBy::kMaxPairs
                          : budgeted.Reached() == Limit::kMaxMinutes ? StoppedBy::kMaxMinutes
                                                                     : StoppedBy::kRequest;
   }
-  return matching;
+  KeepDetails(verifier, ids);
 }
 
-void KeepDetails(const Job& job, const PairVerifier& verifier, const Ranking* ranking,
-                 const std::vector<ImageId>& ids, RunRecord* record, PipelineResult* result) {
-  if (!job.options.keep_details) return;
-  record->AddKnown(verifier.KnownPairs(), job.images);
-  result->discovery = record->Discovery();
-  result->tested = record->Tested();
-  result->images = job.all_images;
-  result->images_without_edge =
-      FindImagesWithoutEdge(job.all_images, result->tested, ranking, ids, kMaxCandidatesInReport);
+void Pipeline::OnProgress(const LoopProgress& progress) {
+  result_.num_expected_tests_left = progress.expected_remaining_tests;
+  if (log_) log_->Write(progress, seconds_());
+  if (options_.keep_details) record_.Add(progress, seconds_());
+  observer_.OnProgress(progress);
 }
 
-// Tests the pairs that the strategy asks for.
-GraphMatchResult FindEdges(const Job& job, PairVerifier& verifier, const OnProgress& on_progress,
-                           RunRecord* record, PipelineResult* result) {
-  const PipelineOptions& options = job.options;
-  if (result->listed) {
-    const PairRestrictions restrictions = FindRestrictions(job, job.images);
-    const std::vector<ImageId> ids = Ids(job.images);
-    const bool all = options.match_list_path.empty();
-    const BudgetedVerifier::Order order = all || options.budget.IsUnlimited()
-                                              ? BudgetedVerifier::Order()
-                                              : OrderOfList(job.listed_pairs);
-    GraphMatchResult matching =
-        TestWithinBudget(job, verifier, order, result, [&](PairVerifier& budgeted) {
-          return all ? VerifyAllPairs(ids, budgeted, on_progress, restrictions)
-                     : VerifyListedPairs(job.listed_pairs, ids, budgeted, on_progress,
-                                         restrictions);
-        });
-    KeepDetails(job, verifier, nullptr, {}, record, result);
-    return matching;
-  }
+void Pipeline::KeepDetails(const PairVerifier& verifier, const std::vector<ImageId>& ids) {
+  if (!options_.keep_details) return;
+  record_.AddKnown(verifier.KnownPairs(), images_);
+  result_.discovery = record_.Discovery();
+  result_.tested = record_.Tested();
+  result_.images = all_images_;
+  result_.images_without_edge =
+      FindImagesWithoutEdge(all_images_, result_.tested, ranked_.ranking.get(),
+                            result_.listed ? std::vector<ImageId>() : ids, kMaxCandidatesInReport);
+}
 
-  const RankedImages ranked = Rank(job, verifier.KnownPairs(), result);
-  const Ranking& ranking = *ranked.ranking;
-  const std::vector<ImageId> ids = Ids(ranked.images);
-  const PairRestrictions restrictions = FindRestrictions(job, ranked.images);
-  const auto test = [&](PairVerifier& budgeted) {
-    if (RetrievesOnce(options.strategy)) {
-      RetrievalOptions retrieval = MakeRetrievalOptions(options);
-      retrieval.restrictions = restrictions;
-      return RunRetrieval(retrieval, ranking, ids, budgeted, job.threads, on_progress);
-    }
-    GraphMatchOptions graph = MakeGraphOptions(options);
-    graph.restrictions = restrictions;
-    if (result->replayed) {
-      return RunGraphMatch(graph, ranking, ids, budgeted, job.threads, on_progress);
-    }
-    const std::string key = LoopKey(options, graph);
-    const std::vector<ImagePair> seeds =
-        ChooseSeeds(graph, ranking, ids, verifier, job.threads, job.state.ReadSeeds(key));
-    job.state.KeepSeeds(key, seeds);
-    return RunGraphMatch(graph, ranking, ids, budgeted, job.threads, on_progress, seeds);
+void Pipeline::MatchAndVerify() {
+  const auto warn = [this](const std::string& warning) { observer_.OnWarning(warning); };
+  const WorkDirectory work(options_.work_path, WorkDirectory::Guard::kGuarded);
+  const ColmapInstallation colmap = DetectColmap(options_.colmap_path, work.Path(), stop_);
+  VerificationOptions verification = options_.verification;
+  verification.num_threads = options_.num_threads;
+  const VerificationPlan plan = PlanVerification(verification, colmap);
+  ColmapVerifier geometry(verification, colmap, database_->Path(), images_, work.Path(), stop_,
+                          warn);
+  BatchVerifier verifier(verification, plan, geometry, *database_, images_, stop_, warn);
+  observer_.OnInfo(
+      std::string("Descriptors are matched ") +
+      (plan.matches_here ? std::string("exactly, with ") + TopTwoTarget() + "." : "by COLMAP."));
+  observer_.OnInfo("COLMAP " + colmap.Version() + " at " + colmap.executable.string() + ", " +
+                   (plan.uses_gpu ? "GPU" : "CPU") +
+                   ", processes: " + std::to_string(plan.num_processes) +
+                   ", threads in each: " + std::to_string(plan.threads_per_process) + ".");
+  ExploreWith(verifier);
+  result_.descriptor_matching = verifier.Statistics();
+  result_.colmap = geometry.SoFar();
+  database_->CheckInPlace();
+}
+
+void Pipeline::Replay() {
+  FinishedGraph graph =
+      ReadFinishedGraph(options_.replay_path, images_, options_.verification.min_num_inliers,
+                        {options_.verification.lock_timeout, &stop_});
+  WarnOfSkippedLines(graph, options_.replay_path, "two different images", observer_);
+  observer_.OnInfo("Replays the matching graph of " + options_.replay_path.string() + ", with " +
+                   std::to_string(graph.num_edges) +
+                   " edges: nothing is matched, and nothing is written to the database.");
+  ReplayVerifier verifier(std::move(graph.pairs));
+  std::unordered_map<ImageId, std::size_t> num_features;
+  for (const ImageRecord& image : images_) num_features[image.id] = image.num_features;
+  verifier.SetStop(&stop_);
+  verifier.SetCosts(std::move(num_features), threads_.NumThreads());
+  seconds_ = [this, &verifier] {
+    return result_.preprocessing_seconds.Sum() + verifier.ModelledSeconds();
   };
-  GraphMatchResult matching =
-      TestWithinBudget(job, verifier, OrderOfRanking(ranking, ids), result, test);
-  KeepDetails(job, verifier, &ranking, ids, record, result);
-  return matching;
+  ExploreWith(verifier);
+  result_.modelled_seconds = verifier.ModelledSeconds();
 }
 
-// Fills the candidates of a dry run.
-void FindCandidates(const Job& job, PipelineResult* result) {
-  const PipelineOptions& options = job.options;
-  const std::vector<VerifiedPair> known = job.database.ReadVerifiedPairs(
-      static_cast<std::size_t>(options.verification.min_num_inliers));
-  const RankedImages ranked = Rank(job, known, result);
-  RetrievalOptions retrieval = MakeRetrievalOptions(options);
-  if (!RetrievesOnce(options.strategy)) {
-    retrieval.num_images = MakeGraphOptions(options).MaxTestsForSampling(ranked.images.size());
+void Pipeline::FindCandidates() {
+  const std::vector<VerifiedPair> known =
+      database_->ReadVerifiedPairs(static_cast<std::size_t>(options_.verification.min_num_inliers));
+  Rank(known);
+  const std::vector<ImageRecord>& images = ranked_.images;
+  RetrievalOptions retrieval = RetrievalOptionsOf(options_);
+  if (IsLoop(options_.strategy)) {
+    retrieval.num_images = LoopOptionsOf(options_).MaxTestsForSampling(images.size());
   }
-  retrieval.restrictions = FindRestrictions(job, ranked.images);
-  for (const VertexPair& pair : RetrievePairs(retrieval, *ranked.ranking, job.threads)) {
-    const ImagePair images(ranked.images[pair.first].id, ranked.images[pair.second].id);
-    if (FindPair(known, images) != nullptr) continue;
-    result->candidates.push_back({images, ranked.ranking->Distance(pair.first, pair.second)});
+  retrieval.restrictions = FindRestrictions(images);
+  for (const VertexPair& pair : RetrievePairs(retrieval, *ranked_.ranking, threads_)) {
+    const ImagePair candidate(images[pair.first].id, images[pair.second].id);
+    if (FindPair(known, candidate) != nullptr) continue;
+    result_.candidates.push_back({candidate, ranked_.ranking->Distance(pair.first, pair.second)});
   }
-  std::sort(result->candidates.begin(), result->candidates.end(),
+  std::sort(result_.candidates.begin(), result_.candidates.end(),
             [](const CandidatePair& a, const CandidatePair& b) {
               return std::tie(a.distance, a.pair) < std::tie(b.distance, b.pair);
             });
-  result->num_candidates_per_image = static_cast<std::size_t>(retrieval.num_images);
-  result->images = job.all_images;
-}
-
-void MatchWithColmap(const Job& job, const OnProgress& on_progress, RunRecord* record,
-                     PipelineResult* result) {
-  const PipelineOptions& options = job.options;
-  const auto warn = [&](const std::string& warning) { job.observer.OnWarning(warning); };
-  const WorkDirectory work(options.work_path, WorkDirectory::Guard::kGuarded);
-  const ColmapInstallation colmap = DetectColmap(options.colmap_path, work.Path(), job.stop);
-  VerificationOptions verification = options.verification;
-  verification.num_threads = options.num_threads;
-  const VerificationPlan plan = PlanVerification(verification, colmap);
-  ColmapVerifier geometry(verification, colmap, job.database.Path(), job.images, work.Path(),
-                          job.stop, warn);
-  BatchVerifier verifier(verification, plan, geometry, job.database, job.images, job.stop, warn);
-  job.observer.OnInfo(
-      std::string("Descriptors are matched ") +
-      (plan.matches_here ? std::string("exactly, with ") + TopTwoTarget() + "." : "by COLMAP."));
-  job.observer.OnInfo("COLMAP " + colmap.Version() + " at " + colmap.executable.string() + ", " +
-                      (plan.uses_gpu ? "GPU" : "CPU") +
-                      ", processes: " + std::to_string(plan.num_processes) +
-                      ", threads in each: " + std::to_string(plan.threads_per_process) + ".");
-  result->matching = FindEdges(job, verifier, on_progress, record, result);
-  result->descriptor_matching = verifier.Statistics();
-  result->colmap = geometry.SoFar();
-}
-
-// Makes the verifier that answers from the finished graph.
-ReplayVerifier MakeReplayVerifier(const Job& job) {
-  const PipelineOptions& options = job.options;
-  FinishedGraph graph =
-      ReadFinishedGraph(options.replay_path, job.images, options.verification.min_num_inliers,
-                        {options.verification.lock_timeout, &job.stop});
-  WarnOfSkippedLines(graph, options.replay_path, "two different images", job.observer);
-  job.observer.OnInfo("Replays the matching graph of " + options.replay_path.string() + ", with " +
-                      std::to_string(graph.num_edges) +
-                      " edges: nothing is matched, and nothing is written to the database.");
-  ReplayVerifier verifier(std::move(graph.pairs));
-  std::unordered_map<ImageId, std::size_t> num_features;
-  for (const ImageRecord& image : job.images) num_features[image.id] = image.num_features;
-  verifier.SetStop(&job.stop);
-  verifier.SetCosts(std::move(num_features), job.threads.NumThreads());
-  return verifier;
+  result_.num_candidates_per_image = static_cast<std::size_t>(retrieval.num_images);
+  result_.images = all_images_;
 }
 
 }  // namespace
@@ -326,84 +346,7 @@ ReplayVerifier MakeReplayVerifier(const Job& job) {
 PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& stop,
                            PipelineObserver& observer) {
   options.Check();
-  const Stopwatch total;
-  PipelineResult result;
-  result.replayed = !options.replay_path.empty();
-  result.listed = !options.match_list_path.empty() ||
-                  options.strategy == PipelineOptions::Strategy::kExhaustive;
-  ThreadPool threads(options.num_threads);
-  result.num_threads = threads.NumThreads();
-  const int num_wanted = EffectiveNumThreads(options.num_threads);
-  if (threads.NumThreads() < num_wanted) {
-    observer.OnWarning("The system lets this program start fewer threads than the " +
-                       std::to_string(num_wanted) +
-                       " that are wanted (ulimit -u, or a limit of the container): it works with "
-                       "what it gets, and is slower.");
-  }
-
-  const bool reads_only = result.replayed || options.dry_run;
-  const sqlite::LockPatience patience(options.verification.lock_timeout, &stop);
-  Database database(options.database_path,
-                    reads_only ? sqlite::Access::kRead : sqlite::Access::kReadWrite, patience);
-  const std::vector<ImageRecord> all_images = database.ReadImages();
-  if (!reads_only) database.CheckWritable();
-  const auto info = [&](const std::string& message) { observer.OnInfo(message); };
-  const auto warn = [&](const std::string& warning) { observer.OnWarning(warning); };
-  // Nothing of a replay is for the next run on these photos.
-  RunState state =
-      result.replayed ? RunState() : RunState(options.database_path, patience, info, warn);
-  const std::vector<ImageRecord> images = WithFeatures(all_images);
-  const std::vector<ImageFingerprint> fingerprints = database.ReadFingerprints(images);
-  database.ExpectFeatures(images, fingerprints);
-  result.num_images = all_images.size();
-  result.num_images_without_features = all_images.size() - images.size();
-  if (images.size() < all_images.size()) {
-    observer.OnWarning(std::to_string(result.num_images_without_features) + " of " +
-                       std::to_string(all_images.size()) +
-                       " images have no features and cannot be matched.");
-  }
-  if (images.size() == 1) {
-    observer.OnWarning("Only one image has features: there is no pair to test.");
-  }
-
-  std::optional<TestLog> log;
-  if (!options.test_log_path.empty()) log.emplace(options.test_log_path, all_images);
-  Job job = {options,      stop,  observer,   threads,
-             database,     state, all_images, images,
-             fingerprints, {},    {},         [&total] { return total.Seconds(); }};
-  if (!options.match_list_path.empty()) {
-    job.listed_pairs = ReadListedPairs(options.match_list_path, all_images, stop, observer);
-  }
-  if (!options.image_list_path.empty()) {
-    ImageList list = ReadImageList(options.image_list_path, images, &stop);
-    WarnOfSkippedLines(list, options.image_list_path, "an image", observer);
-    job.seeking = std::move(list.images);
-  }
-  if (options.dry_run) {
-    FindCandidates(job, &result);
-    result.dry_run = true;
-    result.total_seconds = total.Seconds();
-    return result;
-  }
-  RunRecord record;
-  const auto on_progress = [&](const LoopProgress& progress) {
-    result.num_expected_tests_left = progress.expected_remaining_tests;
-    if (log) log->Write(progress, job.seconds());
-    if (options.keep_details) record.Add(progress, job.seconds());
-    observer.OnProgress(progress);
-  };
-  if (result.replayed) {
-    ReplayVerifier verifier = MakeReplayVerifier(job);
-    job.seconds = [&] { return result.preprocessing_seconds.Sum() + verifier.ModelledSeconds(); };
-    result.matching = FindEdges(job, verifier, on_progress, &record, &result);
-    result.modelled_seconds = verifier.ModelledSeconds();
-  } else {
-    MatchWithColmap(job, on_progress, &record, &result);
-    database.CheckInPlace();
-  }
-  if (log) log->Close();
-  result.total_seconds = total.Seconds();
-  return result;
+  return Pipeline(options, stop, observer).Run();
 }
 
 }  // namespace colmap_graphmatch

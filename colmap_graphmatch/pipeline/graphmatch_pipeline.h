@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/stop_request.h"
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/graph/retrieval.h"
 #include "colmap_graphmatch/pipeline/budgeted_verifier.h"
@@ -98,7 +98,7 @@ struct PipelineResult {
   std::size_t num_images = 0;
   std::size_t num_images_without_features = 0;
   bool listed = false;  // The pairs were given, all or a list: no sampling, no propagation.
-  GraphMatchResult matching;
+  ExplorationResult matching;
   MatchingStatistics descriptor_matching;  // Without a replay:
   ColmapVerifier::Statistics colmap;       // what verification took.
   int num_threads = 1;

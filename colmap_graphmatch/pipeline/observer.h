@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/explorer.h"
 
 namespace colmap_graphmatch {
 

@@ -15,7 +15,7 @@ bool SameBatch(const DiscoveryPoint& a, const DiscoveryPoint& b) {
 }  // namespace
 
 void RunRecord::Add(const LoopProgress& progress, double seconds) {
-  if (progress.last_is_known) return;
+  if (progress.last.is_known) return;
   tested_.push_back(progress.last);
   is_sorted_ = false;
   if (progress.last.outcome == PairOutcome::kFailed) return;

@@ -5,7 +5,7 @@
 
 #include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/database/database.h"
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 
 namespace colmap_graphmatch {

@@ -26,7 +26,7 @@ TestLog::TestLog(const std::filesystem::path& path, const std::vector<ImageRecor
 }
 
 void TestLog::Write(const LoopProgress& progress, double seconds) {
-  if (progress.last_is_known || progress.last.outcome == PairOutcome::kFailed) return;
+  if (progress.last.is_known || progress.last.outcome == PairOutcome::kFailed) return;
   std::array<char, 32> time = {};
   std::snprintf(time.data(), time.size(), "%.4f", seconds);
   file_ << ++num_written_ << ',' << time.data() << ',' << StageName(progress.stage) << ','

@@ -204,7 +204,7 @@ std::string Dump(const Json& report) {
 }  // namespace
 
 std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult& result) {
-  const GraphMatchResult& matching = result.matching;
+  const ExplorationResult& matching = result.matching;
   Json report;
   report["schema"] = kSchema;
   report["version"] = 1;
@@ -236,16 +236,16 @@ std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult&
                        {"matching", result.matching_seconds},
                        {"total", result.total_seconds}};
   if (result.replayed) report["seconds"]["modelled"] = result.modelled_seconds;
-  report["stages"] = {{"sampling", Stage(matching.sampling)},
-                      {"propagation", Stage(matching.propagation)},
-                      {"listed", Stage(matching.listed)},
-                      {"retrieval", Stage(matching.retrieval)},
-                      {"expansion", Stage(matching.expansion)}};
+  report["stages"] = Json::object();
+  for (const LoopStage stage : kLoopStages) {
+    report["stages"][StageName(stage)] = Stage(matching.stages[stage]);
+  }
   report["iterations"] = Json::array();
   for (const IterationStatistics& iteration : matching.iterations) {
-    report["iterations"].push_back({{"iteration", iteration.iteration},
-                                    {"sampling", Stage(iteration.sampling)},
-                                    {"propagation", Stage(iteration.propagation)}});
+    report["iterations"].push_back(
+        {{"iteration", iteration.iteration},
+         {"sampling", Stage(iteration.stages[LoopStage::kSampling])},
+         {"propagation", Stage(iteration.stages[LoopStage::kPropagation])}});
   }
   if (options.keep_details) AddDetails(options, result, &report);
   return Dump(report);

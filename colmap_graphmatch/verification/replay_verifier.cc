@@ -24,7 +24,10 @@ ReplayVerifier::ReplayVerifier(const std::unordered_map<ImagePair, std::uint32_t
 void ReplayVerifier::SetKnownPairs(std::vector<ImagePair> pairs) {
   std::sort(pairs.begin(), pairs.end());
   known_pairs_.clear();
-  for (const ImagePair& pair : pairs) known_pairs_.push_back(Answer(pair));
+  for (const ImagePair& pair : pairs) {
+    known_pairs_.push_back(Answer(pair));
+    known_pairs_.back().is_known = true;
+  }
 }
 
 void ReplayVerifier::SetCosts(std::unordered_map<ImageId, std::size_t> num_features,
@@ -55,7 +58,8 @@ bool ReplayVerifier::Verify(const std::vector<ImagePair>& pairs,
   for (const ImagePair& pair : pairs) {
     if (stop_ != nullptr && stop_->Requested()) return false;
     modelled_seconds_ += Cost(pair) / num_threads_;
-    on_verified(Answer(pair));
+    const VerifiedPair* known = FindPair(known_pairs_, pair);
+    on_verified(known != nullptr ? *known : Answer(pair));
   }
   return true;
 }

@@ -4,6 +4,7 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/version.h"
+#include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/matching/descriptor_cache.h"
 #include "colmap_graphmatch/matching/descriptor_matcher.h"
@@ -34,8 +35,8 @@ int main() {
   gm::ThreadPool threads(2);
   const gm::VectorRanking ranking({}, 3, 2, {1, 0, 0.8F, 0.6F, 0, 1}, threads);
   gm::ReplayVerifier verifier({{gm::ImagePair(1, 2), 30}, {gm::ImagePair(2, 3), 40}});
-  const gm::GraphMatchResult result =
-      gm::RunGraphMatch({}, ranking, {1, 2, 3}, verifier, threads, nullptr);
+  gm::GraphMatchProposer proposer({}, ranking, threads);
+  const gm::ExplorationResult result = gm::Explore(proposer, {1, 2, 3}, verifier, nullptr);
   std::printf("colmap_graphmatch %s: %zu edges\n", gm::kVersion, result.graph.NumEdges());
   if (result.graph.NumEdges() != 2) return 1;
 

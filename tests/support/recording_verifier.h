@@ -52,7 +52,9 @@ class RecordingVerifier : public PairVerifier {
  private:
   VerifiedPair Answer(const ImagePair& pair) const {
     if (failing.count(pair) > 0) return {pair, PairOutcome::kFailed, 0};
-    return {pair, edges_.count(pair) > 0 ? PairOutcome::kEdge : PairOutcome::kNoEdge, 20};
+    const bool is_edge = edges_.count(pair) > 0;
+    return {pair, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge, 20, -1,
+            known.count(pair) > 0};
   }
 
   std::set<ImagePair> edges_;

@@ -1,0 +1,28 @@
+#include "colmap_graphmatch/graph/explorer.h"
+
+#include <optional>
+
+#include "colmap_graphmatch/graph/graph_builder.h"
+
+namespace colmap_graphmatch {
+
+ExplorationResult Explore(PairProposer& proposer, const std::vector<ImageId>& image_ids,
+                          PairVerifier& verifier, const OnProgress& on_progress,
+                          const KnownPairsPolicy& known) {
+  GraphBuilder builder(image_ids, verifier, on_progress);
+  if (!known.seeds.empty() && builder.AddKnown(known.seeds)) proposer.OnKnown(builder.Graph());
+  while (builder.Continues()) {
+    if (const std::optional<Proposal> proposal = proposer.Next(builder.Graph())) {
+      proposer.OnTested(builder.Verify(*proposal, proposer));
+    } else if (known.others_join_in_the_end && builder.AddKnown()) {
+      proposer.OnKnown(builder.Graph());
+    } else {
+      break;
+    }
+  }
+  // A run that was stopped may not have come to all of it.
+  if (known.others_join_in_the_end) builder.AddKnown();
+  return builder.Finish();
+}
+
+}  // namespace colmap_graphmatch

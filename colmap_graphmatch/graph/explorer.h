@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/pair_proposer.h"
+#include "colmap_graphmatch/graph/stages.h"
+
+namespace colmap_graphmatch {
+
+// Where a run is after a pair was verified.
+struct LoopProgress {
+  LoopStage stage = LoopStage::kSampling;
+  int iteration = 0;
+  VerifiedPair last;          // The pair.
+  StageStatistics all;        // Of all stages together.
+  std::size_t num_edges = 0;  // Of the whole graph, those of earlier runs included.
+  std::size_t num_components = 0;
+  std::size_t largest_component = 0;
+  std::size_t num_isolated = 0;
+  // An estimate of the tests to come (docs/benchmarks.md says how good it is).
+  std::size_t expected_remaining_tests = 0;
+  std::size_t expected_remaining_samples = 0;  // Those of them that sampling draws.
+};
+
+using OnProgress = std::function<void(const LoopProgress&)>;
+
+// What a run found.
+struct ExplorationResult {
+  MatchingGraph graph{0};
+  StagesStatistics stages;
+  std::vector<IterationStatistics> iterations;  // Of the paper's loop.
+  // Pairs that were in the database before the run and that the proposer did not ask for itself.
+  std::size_t num_seed_pairs = 0;
+  std::size_t num_seed_edges = 0;
+  std::size_t num_components = 0;
+  std::size_t largest_component = 0;
+  std::size_t num_isolated = 0;
+  std::vector<ImagePair> failed_pairs;
+  bool finished = true;  // False if the verifier was asked to stop.
+};
+
+// Which of the pairs that the verifier knows become part of the graph unasked.
+struct KnownPairsPolicy {
+  std::vector<ImagePair> seeds;  // From the start; ascending.
+  // The others, once the proposer has nothing more to propose: what is known may lead on.
+  bool others_join_in_the_end = true;
+};
+
+// The one loop: has tested what the proposer proposes until it proposes nothing more. image_ids:
+// the image of every vertex, ascending. on_progress may be empty. Exceptions of the verifier pass
+// through.
+ExplorationResult Explore(PairProposer& proposer, const std::vector<ImageId>& image_ids,
+                          PairVerifier& verifier, const OnProgress& on_progress,
+                          const KnownPairsPolicy& known = {});
+
+}  // namespace colmap_graphmatch

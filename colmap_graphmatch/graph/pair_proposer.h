@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/stages.h"
+
+namespace colmap_graphmatch {
+
+// Pairs to be tested next, as one batch.
+struct Proposal {
+  std::vector<VertexPair> pairs;  // Ascending, not empty; none of them is in the graph.
+  LoopStage stage = LoopStage::kSampling;
+  int iteration = 0;
+};
+
+// About how many tests are to come after a proposal.
+struct ExpectedTests {
+  double all = 0;
+  double samples = 0;  // Those of them that sampling draws.
+};
+
+// Decides which pairs are tested: a strategy. It sees the graph and what became of its proposals,
+// and nothing else of the run; what it proposes depends on that alone.
+class PairProposer {
+ public:
+  virtual ~PairProposer() = default;
+
+  // The next pairs to test; none if it has no more to propose as things stand.
+  virtual std::optional<Proposal> Next(const MatchingGraph& graph) = 0;
+
+  // What became of the last proposal, which is in the graph by then.
+  virtual void OnTested(const StageStatistics& /*batch*/) {}
+
+  // Pairs that others had tested have joined the graph.
+  virtual void OnKnown(const MatchingGraph& /*graph*/) {}
+
+  // For the progress: asked once for a proposal, before it is tested.
+  virtual ExpectedTests TestsAfter(const Proposal& /*proposal*/,
+                                   const MatchingGraph& /*graph*/) const {
+    return {};
+  }
+};
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace colmap_graphmatch {
+
+// Who proposed a pair. kSampling, kPropagation: the paper's loop (graphmatch.h). kListed: the pairs
+// were given beforehand (listed_pairs.h). kRetrieval, kExpansion: see retrieval.h.
+enum class LoopStage { kSampling, kPropagation, kListed, kRetrieval, kExpansion };
+inline constexpr std::array<LoopStage, 5> kLoopStages = {
+    LoopStage::kSampling, LoopStage::kPropagation, LoopStage::kListed, LoopStage::kRetrieval,
+    LoopStage::kExpansion};
+
+// The lower-case word for a stage in logs and reports.
+const char* StageName(LoopStage stage);
+
+struct StageStatistics {
+  std::size_t num_tested = 0;  // Pairs that the verifier tested in this run.
+  std::size_t num_edges = 0;   // Those of them that passed.
+  std::size_t num_failed = 0;  // Pairs that the verifier could not test.
+  std::size_t num_known = 0;   // Pairs asked for that earlier runs had tested.
+  std::size_t num_known_edges = 0;
+  double seconds = 0;
+
+  // Edges found / pairs tested, 0 without tests.
+  double Efficiency() const {
+    return num_tested == 0 ? 0 : static_cast<double>(num_edges) / static_cast<double>(num_tested);
+  }
+};
+
+StageStatistics operator+(const StageStatistics& a, const StageStatistics& b);
+
+// Of every stage.
+class StagesStatistics {
+ public:
+  StageStatistics& operator[](LoopStage stage) { return stages_[static_cast<std::size_t>(stage)]; }
+  const StageStatistics& operator[](LoopStage stage) const {
+    return stages_[static_cast<std::size_t>(stage)];
+  }
+  StageStatistics All() const;
+
+ private:
+  std::array<StageStatistics, kLoopStages.size()> stages_ = {};
+};
+
+struct IterationStatistics {
+  int iteration = 0;  // Counted from 0; those without a test are left out.
+  StagesStatistics stages;
+};
+
+}  // namespace colmap_graphmatch

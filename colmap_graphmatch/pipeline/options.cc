@@ -1,0 +1,45 @@
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/strategy.h"
+
+namespace colmap_graphmatch {
+
+void PipelineOptions::Check() const {
+  if (!match_list_path.empty() && strategy != Strategy::kGraphMatch) {
+    throw OptionsError(
+        "--GraphMatching.match_list_path and --GraphMatching.strategy contradict each other: give "
+        "one of them.");
+  }
+  if (!match_list_path.empty() && !image_list_path.empty()) {
+    throw OptionsError(
+        "--GraphMatching.match_list_path lists pairs, --VocabTreeMatching.match_list_path images "
+        "that look for partners: give one of them.");
+  }
+  const bool ranks = match_list_path.empty() && strategy != Strategy::kExhaustive;
+  if (!ranks && (!ranking.ranking_path.empty() || !ranking.export_path.empty() ||
+                 !ranking.vectors.vectors_path.empty())) {
+    throw OptionsError(
+        "--GraphMatching.ranking_path, --GraphMatching.vectors_path and "
+        "--GraphMatching.export_vectors need a strategy that ranks images; a list of pairs and the "
+        "strategy exhaustive do not.");
+  }
+  EffectiveNumThreads(num_threads);
+  if (num_retrieved_images < 0) {
+    throw OptionsError("num_retrieved_images is " + std::to_string(num_retrieved_images) +
+                       "; it must be positive, or 0 to have it chosen.");
+  }
+  if (dry_run && (!ranks || !replay_path.empty())) {
+    throw OptionsError(
+        "--GraphMatching.dry_run shows which pairs a strategy that ranks images would test first; "
+        "with a list of pairs, the strategy exhaustive or --GraphMatching.replay_path there is "
+        "nothing to show.");
+  }
+  RetrievalOptionsOf(*this).Check();
+  budget.Check();
+  ranking.Check();
+  graph.Check();
+  verification.Check();
+}
+
+}  // namespace colmap_graphmatch
