@@ -22,6 +22,7 @@
 #include "colmap_graphmatch/cli/exit_codes.h"
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/cli/run_files.h"
+#include "colmap_graphmatch/cli/summary.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/report/exports.h"
 #include "colmap_graphmatch/report/html_report.h"
