@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <set>
 #include <string>
@@ -9,6 +10,7 @@
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/cli/console.h"
 #include "colmap_graphmatch/cli/option_table.h"
+#include "colmap_graphmatch/cli/option_values.h"
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/cli/progress.h"
 #include "colmap_graphmatch/cli/summary.h"
@@ -399,6 +401,35 @@ TEST(Console, NamesGiveNoOrdersToTheTerminal) {
   EXPECT_EQ(WithoutControlCharacters("\xc2\x9b"
                                      "2J \xc2\xa9 \xc2"),
             "?2J \xc2\xa9 \xc2");
+}
+
+TEST(OptionValues, WordsOfAnEnumAreListedInOrder) {
+  PipelineOptions::Strategy strategy = PipelineOptions::Strategy::kRetrieval;
+  const Value value = OneOf(&strategy, kStrategyWords);
+  EXPECT_EQ(value.values, "one of briad, exhaustive, graphmatch, propagation, retrieval, sampling");
+  EXPECT_EQ(value.default_value, "retrieval");
+  EXPECT_TRUE(value.read("briad"));
+  EXPECT_EQ(strategy, PipelineOptions::Strategy::kBriad);
+  EXPECT_FALSE(value.read("Briad"));
+  EXPECT_EQ(strategy, PipelineOptions::Strategy::kBriad);
+}
+
+TEST(OptionValues, ARefusedValueChangesNothing) {
+  int number = 5;
+  const Value bounded = IntOf(&number, 0, 9);
+  EXPECT_EQ(bounded.values, "an integer from 0 to 9");
+  EXPECT_FALSE(bounded.read("10"));
+  EXPECT_EQ(number, 5);
+  EXPECT_TRUE(bounded.read("9"));
+  EXPECT_EQ(number, 9);
+  std::uint64_t seed = 7;
+  bool from_clock = false;
+  const Value seed_value = SeedOf(&seed, &from_clock);
+  EXPECT_TRUE(seed_value.read("-1"));
+  EXPECT_TRUE(from_clock);
+  EXPECT_FALSE(seed_value.read("-2"));
+  EXPECT_FALSE(from_clock);
+  EXPECT_EQ(seed, 7U);
 }
 
 // A run over 5 images that was stopped by its budget.
