@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <set>
 #include <string>
@@ -9,8 +10,10 @@
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/cli/console.h"
 #include "colmap_graphmatch/cli/option_table.h"
+#include "colmap_graphmatch/cli/option_values.h"
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/cli/progress.h"
+#include "colmap_graphmatch/cli/summary.h"
 #include "tests/support/synthetic_database.h"
 
 namespace colmap_graphmatch {
@@ -398,6 +401,77 @@ TEST(Console, NamesGiveNoOrdersToTheTerminal) {
   EXPECT_EQ(WithoutControlCharacters("\xc2\x9b"
                                      "2J \xc2\xa9 \xc2"),
             "?2J \xc2\xa9 \xc2");
+}
+
+TEST(OptionValues, WordsOfAnEnumAreListedInOrder) {
+  PipelineOptions::Strategy strategy = PipelineOptions::Strategy::kRetrieval;
+  const Value value = OneOf(&strategy, kStrategyWords);
+  EXPECT_EQ(value.values, "one of briad, exhaustive, graphmatch, propagation, retrieval, sampling");
+  EXPECT_EQ(value.default_value, "retrieval");
+  EXPECT_TRUE(value.read("briad"));
+  EXPECT_EQ(strategy, PipelineOptions::Strategy::kBriad);
+  EXPECT_FALSE(value.read("Briad"));
+  EXPECT_EQ(strategy, PipelineOptions::Strategy::kBriad);
+}
+
+TEST(OptionValues, ARefusedValueChangesNothing) {
+  int number = 5;
+  const Value bounded = IntOf(&number, 0, 9);
+  EXPECT_EQ(bounded.values, "an integer from 0 to 9");
+  EXPECT_FALSE(bounded.read("10"));
+  EXPECT_EQ(number, 5);
+  EXPECT_TRUE(bounded.read("9"));
+  EXPECT_EQ(number, 9);
+  std::uint64_t seed = 7;
+  bool from_clock = false;
+  const Value seed_value = SeedOf(&seed, &from_clock);
+  EXPECT_TRUE(seed_value.read("-1"));
+  EXPECT_TRUE(from_clock);
+  EXPECT_FALSE(seed_value.read("-2"));
+  EXPECT_FALSE(from_clock);
+  EXPECT_EQ(seed, 7U);
+}
+
+// A run over 5 images that was stopped by its budget.
+PipelineResult MakeResult() {
+  PipelineResult result;
+  result.num_images = 5;
+  result.num_images_without_features = 1;
+  result.matching.num_isolated = 1;
+  result.matching.num_components = 1;
+  result.matching.largest_component = 3;
+  result.matching.finished = false;
+  result.stopped_by = PipelineResult::StoppedBy::kMaxPairs;
+  result.num_expected_tests_left = 2;
+  result.preprocessing_seconds = {1, 2, 3};
+  result.matching_seconds = 90;
+  result.total_seconds = 96.5;
+  return result;
+}
+
+TEST(Summary, OfARunThatABudgetEnded) {
+  PipelineOptions options;
+  options.budget.max_pairs = 4;
+  EXPECT_EQ(FormatSummary(options, MakeResult()),
+            "\n"
+            "Images             5 (1 without features)\n"
+            "Pairs tested       0 of 6 possible (0.00 %)\n"
+            "  all                  0 tested         0 edges   efficiency -            0.0 s\n"
+            "Matching graph     0 edges, 1 components, the largest of 3 images\n"
+            "Without an edge    2 images\n"
+            "Stopped            after max_pairs = 4; about 2 more tests were to come\n"
+            "Time               96.5 s (mixture 1.0 s, Fisher vectors 2.0 s, ranking 3.0 s, "
+            "matching 90.0 s)\n");
+}
+
+TEST(Summary, OfListedPairsHasNoStages) {
+  PipelineResult result = MakeResult();
+  result.listed = true;
+  result.stopped_by = PipelineResult::StoppedBy::kNothing;
+  const std::string text = FormatSummary(PipelineOptions(), result);
+  EXPECT_THAT(text, Not(HasSubstr("listed")));
+  EXPECT_THAT(text, Not(HasSubstr("ranking")));
+  EXPECT_THAT(text, HasSubstr("\nTime               96.5 s\n"));
 }
 
 class ProjectTest : public ::testing::Test {

@@ -276,7 +276,8 @@ TEST_F(ReplayTest, TheLogHasEveryTest) {
 
 TEST_F(ReplayTest, TheReportSaysWhatWasFound) {
   const PipelineResult result = Run();
-  const nlohmann::json report = nlohmann::json::parse(MakeJsonReport(options_, result));
+  const nlohmann::json report =
+      nlohmann::json::parse(MakeJsonReport(MakeReportData(options_, result)));
   EXPECT_EQ(report["schema"], "graphmatch-report");
   EXPECT_EQ(report["version"], 1);
   EXPECT_EQ(report["strategy"], "graphmatch");
@@ -306,7 +307,8 @@ TEST_F(ReplayTest, TheReportKnowsEveryImageAndPair) {
   images.push_back(stranger);
   WriteSyntheticDatabase(options_.database_path, Schema::kColmap38, images);
   const PipelineResult result = Run();
-  const nlohmann::json report = nlohmann::json::parse(MakeJsonReport(options_, result));
+  const nlohmann::json report =
+      nlohmann::json::parse(MakeJsonReport(MakeReportData(options_, result)));
   EXPECT_EQ(report["image_names"].size(), 31U);
   EXPECT_EQ(report["image_names"][3], images[3].name);
   EXPECT_EQ(report["image_ids"][30], 31);
@@ -314,6 +316,7 @@ TEST_F(ReplayTest, TheReportKnowsEveryImageAndPair) {
   EXPECT_EQ(report["edge_list"].size(), 60U);
   EXPECT_EQ(report["edge_list"][0], nlohmann::json({0, 1, 20}));
   EXPECT_EQ(report["nonedge_list"].size() / 2 + 60, result.matching.graph.NumTested());
+  EXPECT_EQ(report["nonedges_left_out"], 0);
   EXPECT_EQ(report["num_bridges"], 0);
   EXPECT_EQ(report["stopped_by"], nullptr);
   ASSERT_EQ(report["images_without_edge"].size(), 1U);

@@ -1,17 +1,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/report/html_report.h"
+#include "colmap_graphmatch/report/json_report.h"
+#include "colmap_graphmatch/report/report_data.h"
 #include "colmap_graphmatch/report/thumbnails.h"
 #include "tests/support/synthetic_database.h"
 
@@ -79,9 +83,95 @@ TEST(HtmlReport, NeedsNothingElse) {
   EXPECT_THAT(html, HasSubstr("Redistributions in binary form"));
 }
 
+// A run that tested pairs of so many images; the first tests are edges.
+PipelineResult MakeResult(ImageId num_images, std::size_t num_tested, std::size_t num_edges) {
+  PipelineResult result;
+  result.num_images = num_images;
+  for (ImageId id = 1; id <= num_images; ++id) {
+    result.images.push_back({id, std::to_string(id) + ".jpg", 100});
+  }
+  for (ImageId a = 1; a <= num_images; ++a) {
+    for (ImageId b = a + 1; b <= num_images; ++b) {
+      if (result.tested.size() == num_tested) return result;
+      const bool is_edge = result.tested.size() < num_edges;
+      result.tested.push_back({ImagePair(a, b), is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
+                               is_edge ? 20U : 0U});
+    }
+  }
+  return result;
+}
+
+PipelineOptions WithDetails() {
+  PipelineOptions options;
+  options.keep_details = true;
+  return options;
+}
+
+TEST(ReportData, AllPairsWithoutAnEdgeWhereThereAreFew) {
+  PipelineResult result = MakeResult(4, 6, 2);
+  result.tested[4].outcome = PairOutcome::kFailed;
+  const ReportData data = MakeReportData(WithDetails(), result);
+  ASSERT_TRUE(data.details.has_value());
+  EXPECT_THAT(data.details->nonedges,
+              ElementsAre(std::pair(0, 3), std::pair(1, 2), std::pair(2, 3)));
+  EXPECT_EQ(data.details->num_nonedges_left_out, 0);
+  const Json report = Json::parse(MakeJsonReport(data));
+  EXPECT_EQ(report["nonedge_list"], Json({0, 3, 1, 2, 2, 3}));
+  EXPECT_EQ(report["nonedges_left_out"], 0);
+}
+
+TEST(ReportData, AnEvenSampleOfManyPairsWithoutAnEdge) {
+  constexpr std::size_t kNumNonedges = 3 * kMaxNonedges + 7;
+  const PipelineResult result = MakeResult(2000, kNumNonedges + 50, 50);
+  const ReportData data = MakeReportData(WithDetails(), result);
+  ASSERT_TRUE(data.details.has_value());
+  const auto& nonedges = data.details->nonedges;
+  ASSERT_EQ(nonedges.size(), kMaxNonedges);
+  EXPECT_EQ(data.details->num_nonedges_left_out, kNumNonedges - kMaxNonedges);
+  EXPECT_EQ(data.details->edges.size(), 50);
+  // Every image has a third of its pairs.
+  std::vector<std::size_t> all(2000, 0);
+  std::vector<std::size_t> sampled(2000, 0);
+  for (std::size_t i = 50; i < result.tested.size(); ++i) ++all[result.tested[i].pair.id1 - 1];
+  for (const auto& [a, b] : nonedges) ++sampled[a];
+  for (std::size_t image = 0; image < 2000; ++image) {
+    EXPECT_NEAR(static_cast<double>(sampled[image]), static_cast<double>(all[image]) / 3, 1.5);
+  }
+  EXPECT_TRUE(std::is_sorted(nonedges.begin(), nonedges.end()));
+
+  const Json report = Json::parse(MakeJsonReport(data));
+  EXPECT_EQ(report["nonedge_list"].size(), 2 * kMaxNonedges);
+  EXPECT_EQ(report["nonedges_left_out"], kNumNonedges - kMaxNonedges);
+  EXPECT_EQ(MakeReportData(WithDetails(), result).details->nonedges, nonedges);
+}
+
+TEST(ReportData, WithoutDetailsSumsAlone) {
+  const ReportData data = MakeReportData(PipelineOptions(), MakeResult(4, 6, 2));
+  EXPECT_FALSE(data.details.has_value());
+  const Json report = Json::parse(MakeJsonReport(data));
+  EXPECT_FALSE(report.contains("edge_list"));
+  EXPECT_EQ(report["images"]["total"], 4);
+}
+
+TEST(ReportData, NamesTheStrategyAndTheDescriptor) {
+  PipelineOptions options;
+  options.strategy = PipelineOptions::Strategy::kBriad;
+  options.ranking.vectors.descriptor = ImageVectorOptions::Descriptor::kVlad;
+  PipelineResult result = MakeResult(4, 6, 2);
+  EXPECT_EQ(MakeReportData(options, result).strategy, "briad");
+  EXPECT_EQ(MakeReportData(options, result).descriptor, "vlad");
+  options.ranking.ranking_path = "lists.tsv";
+  EXPECT_EQ(MakeReportData(options, result).descriptor, "lists");
+  options.match_list_path = "pairs.txt";
+  result.listed = true;
+  EXPECT_EQ(MakeReportData(options, result).strategy, "list");
+  EXPECT_EQ(MakeReportData(options, result).descriptor, std::nullopt);
+}
+
 TEST(ChooseThumbnails, AllWhereThereAreFew) {
-  const Json report = {{"image_names", {"a", "b", "c"}}};
-  EXPECT_THAT(ChooseThumbnails(report.dump(), 3),
+  ReportDetails details;
+  details.images = {{1, "a", 0}, {2, "b", 0}, {3, "c", 0}};
+  EXPECT_THAT(ChooseThumbnails(details, 3),
               ElementsAre(std::pair(0, "a"), std::pair(1, "b"), std::pair(2, "c")));
 }
 
@@ -90,7 +180,7 @@ class ChooseThumbnailsTest : public ::testing::Test {
   // The indices of the chosen images, of 20.
   std::vector<std::size_t> Choose(std::size_t limit) const {
     std::vector<std::size_t> chosen;
-    for (const auto& [image, name] : ChooseThumbnails(report_.dump(), limit)) {
+    for (const auto& [image, name] : ChooseThumbnails(details_, limit)) {
       EXPECT_EQ(name, std::to_string(image));
       chosen.push_back(image);
     }
@@ -98,17 +188,17 @@ class ChooseThumbnailsTest : public ::testing::Test {
   }
 
   ChooseThumbnailsTest() {
-    for (int i = 0; i < 20; ++i) report_["image_names"].push_back(std::to_string(i));
-    report_["images_without_edge"] = {{{"image", 19}, {"candidates", {{{"image", 4}}}}}};
-    report_["bridges"] = {{{"images", {3, 9}}}};
-    report_["articulation_points"] = {{{"image", 8}}};
-    report_["weak_links"] = {{{"edges", {{2, 10, 16}}}}};
-    report_["connected_components"] = {{0, 1, 2, 3, 4, 8, 9, 10}, {5, 6, 7}};
-    report_["edge_list"] = {{0, 1, 20}, {1, 2, 20},  {1, 3, 20}, {3, 4, 20}, {3, 9, 20},
-                            {8, 9, 20}, {2, 10, 16}, {5, 6, 20}, {6, 7, 20}};
+    for (ImageId i = 0; i < 20; ++i) details_.images.push_back({i + 1, std::to_string(i), 0});
+    details_.components = {{0, 1, 2, 3, 4, 8, 9, 10}, {5, 6, 7}};
+    details_.edges = {{0, 1, 20}, {1, 2, 20},  {1, 3, 20}, {3, 4, 20}, {3, 9, 20},
+                      {8, 9, 20}, {2, 10, 16}, {5, 6, 20}, {6, 7, 20}};
+    details_.images_without_edge = {{19, 0, {{4, 0.5, -1, 0}}}};
+    details_.bridges = {{4, {4, 4}}};
+    details_.articulation_points = {{8, {4, 4}}};
+    details_.weak_links = {{{4, 4}, {6}}};
   }
 
-  Json report_;
+  ReportDetails details_;
 };
 
 TEST_F(ChooseThumbnailsTest, WhatTheListsShowComesFirst) {

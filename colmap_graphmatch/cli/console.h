@@ -12,13 +12,15 @@
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/cli/log_options.h"
 #include "colmap_graphmatch/cli/progress.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/observer.h"
 
 namespace spdlog {
 class logger;
 }
 
 namespace colmap_graphmatch {
+
+class TerminalSink;
 
 // The log and the progress of a run. Lines look like glog's:
 //   I20261124 14:12:53.123456 12345 graphmatch_matcher] message
@@ -47,7 +49,6 @@ class Console : public PipelineObserver {
   void NoteContinue() noexcept { continued_ = true; }
 
  private:
-  class TerminalSink;
   using Clock = std::chrono::steady_clock;
 
   void Watch();
@@ -93,8 +94,5 @@ class Console : public PipelineObserver {
 // With '?' in their place, but for line ends and tabs. Names from a database could otherwise give
 // orders to the terminal.
 std::string WithoutControlCharacters(std::string text);
-
-// What the run found and what it cost.
-std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result);
 
 }  // namespace colmap_graphmatch

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <system_error>
 
+#include "colmap_graphmatch/base/enum_words.h"
+
 namespace colmap_graphmatch {
 
 // What is logged, and where. Errors that end the program reach the standard error output always.
@@ -24,5 +26,11 @@ struct LogOptions {
     return std::filesystem::is_directory(path, ignored) ? path / "graphmatch_matcher.log" : path;
   }
 };
+
+inline constexpr EnumWords<LogOptions::Target, 4> kLogTargetWords = {
+    {{LogOptions::Target::kStderr, "stderr"},
+     {LogOptions::Target::kStdout, "stdout"},
+     {LogOptions::Target::kFile, "file"},
+     {LogOptions::Target::kStderrAndFile, "stderr_and_file"}}};
 
 }  // namespace colmap_graphmatch

@@ -22,10 +22,12 @@
 #include "colmap_graphmatch/cli/exit_codes.h"
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/cli/run_files.h"
+#include "colmap_graphmatch/cli/summary.h"
 #include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/report/exports.h"
 #include "colmap_graphmatch/report/html_report.h"
 #include "colmap_graphmatch/report/json_report.h"
+#include "colmap_graphmatch/report/report_data.h"
 #include "colmap_graphmatch/report/thumbnails.h"
 
 namespace colmap_graphmatch {
@@ -104,12 +106,12 @@ void WarnIfNotWritten(const std::ostream& stream, Console& console) {
 }
 
 // The photos that the page shows, as far as they can be read.
-std::map<std::size_t, std::string> FindPhotos(const CommandLine& line, const std::string& json,
+std::map<std::size_t, std::string> FindPhotos(const CommandLine& line, const ReportData& data,
                                               Console& console) {
   const std::filesystem::path& image_path = line.pipeline.ranking.vectors.image_path;
-  if (image_path.empty()) return {};
+  if (image_path.empty() || !data.details) return {};
   ThreadPool threads(line.pipeline.num_threads);
-  const auto wanted = ChooseThumbnails(json);
+  const auto wanted = ChooseThumbnails(*data.details);
   auto thumbnails = MakeThumbnails(image_path, wanted, threads, stop_request);
   if (thumbnails.size() < wanted.size() && !stop_request.Requested()) {
     console.OnWarning(std::to_string(wanted.size() - thumbnails.size()) + " of " +
@@ -120,10 +122,11 @@ std::map<std::size_t, std::string> FindPhotos(const CommandLine& line, const std
 }
 
 void WriteReport(const CommandLine& line, const PipelineResult& result, Console& console) {
-  const std::string json = MakeJsonReport(line.pipeline, result);
+  const ReportData data = MakeReportData(line.pipeline, result);
+  const std::string json = MakeJsonReport(data);
   WriteWholeFile(JsonReportPath(line.report_path), [&](std::ostream& file) { file << json; });
   if (!IsPage(line.report_path)) return;
-  const auto photos = FindPhotos(line, json, console);
+  const auto photos = FindPhotos(line, data, console);
   WriteWholeFile(line.report_path,
                  [&](std::ostream& file) { file << MakeHtmlReport(json, photos); });
 }

@@ -4,15 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/lexical_cast.hpp>
-#include <cctype>
-#include <cmath>
-#include <cstdint>
-#include <limits>
 #include <map>
-#include <optional>
 #include <utility>
 
+#include "colmap_graphmatch/cli/option_values.h"
 #include "colmap_graphmatch/cli/options.h"
 
 namespace colmap_graphmatch {
@@ -20,179 +15,11 @@ namespace {
 
 using Use = OptionRow::Use;
 
-// What the user may write for an enumeration.
-template <typename Enum>
-using Names = std::map<std::string, Enum>;
-
-const Names<PipelineOptions::Strategy> kStrategies = {
-    {"graphmatch", PipelineOptions::Strategy::kGraphMatch},
-    {"sampling", PipelineOptions::Strategy::kSampling},
-    {"propagation", PipelineOptions::Strategy::kPropagation},
-    {"retrieval", PipelineOptions::Strategy::kRetrieval},
-    {"briad", PipelineOptions::Strategy::kBriad},
-    {"exhaustive", PipelineOptions::Strategy::kExhaustive}};
-const Names<VerificationOptions::Matcher> kMatchers = {
-    {"auto", VerificationOptions::Matcher::kAuto},
-    {"exact", VerificationOptions::Matcher::kExact},
-    {"colmap", VerificationOptions::Matcher::kColmap}};
-const Names<ImageVectorOptions::Descriptor> kDescriptors = {
-    {"fisher", ImageVectorOptions::Descriptor::kFisher},
-    {"vlad", ImageVectorOptions::Descriptor::kVlad},
-    {"gist", ImageVectorOptions::Descriptor::kGist},
-    {"file", ImageVectorOptions::Descriptor::kFile}};
-const Names<LogOptions::Target> kLogTargets = {
-    {"stderr", LogOptions::Target::kStderr},
-    {"stdout", LogOptions::Target::kStdout},
-    {"file", LogOptions::Target::kFile},
-    {"stderr_and_file", LogOptions::Target::kStderrAndFile}};
 constexpr std::array<const char*, 3> kMatchingGroups = {"SiftMatching.", "TwoViewGeometry.",
                                                         "FeatureMatching."};
 
-template <typename T>
-std::optional<T> Number(const std::string& text) {
-  T value{};
-  return boost::conversion::try_lexical_convert(text, value) ? std::optional<T>(value)
-                                                             : std::nullopt;
-}
-
 bool EndsWith(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
-std::string Text(double value) { return fmt::format("{}", value); }
-
-// What an option may be, in words and as a function that stores it.
-struct Value {
-  std::string values;
-  std::string default_value;
-  std::function<bool(const std::string&)> read;
-  std::vector<std::string> choices = {};
-  OptionRow::Path path = OptionRow::Path::kNone;
-};
-
-const std::vector<std::string> kBoolChoices = {"0", "1"};
-
-Value Flag(bool* field) {
-  return {"", "", [field](const std::string&) { return *field = true; }};
-}
-
-Value BoolOf(bool* field) {
-  return {"0 or 1", *field ? "1" : "0",
-          [field](const std::string& text) {
-            const std::optional<bool> value = ParseBool(text);
-            if (value) *field = *value;
-            return value.has_value();
-          },
-          kBoolChoices};
-}
-
-Value IntOf(int* field, int minimum, int maximum = std::numeric_limits<int>::max()) {
-  const bool is_bounded = maximum < std::numeric_limits<int>::max();
-  return {is_bounded ? fmt::format("an integer from {} to {}", minimum, maximum)
-                     : fmt::format("an integer of at least {}", minimum),
-          std::to_string(*field), [field, minimum, maximum](const std::string& text) {
-            const std::optional<int> value = Number<int>(text);
-            if (!value || *value < minimum || *value > maximum) return false;
-            *field = *value;
-            return true;
-          }};
-}
-
-// COLMAP takes every number below 1 for all cores.
-Value NumThreadsOf(int* field) {
-  return {"an integer; below 1: all cores", std::to_string(*field),
-          [field](const std::string& text) {
-            const std::optional<int> value = Number<int>(text);
-            if (value) *field = std::max(*value, 0) == 0 ? -1 : *value;
-            return value.has_value();
-          }};
-}
-
-// 0 stands for no limit.
-Value CountOf(std::size_t* field) {
-  return {"an integer of at least 0", std::to_string(*field), [field](const std::string& text) {
-            const std::optional<std::size_t> value = Number<std::size_t>(text);
-            // lexical_cast takes -2 for a great number.
-            if (!value || text.find('-') != std::string::npos) return false;
-            *field = *value;
-            return true;
-          }};
-}
-
-// COLMAP takes -1 for a seed from the clock.
-Value SeedOf(CommandLine* line) {
-  std::uint64_t* field = &line->pipeline.seed;
-  return {"an integer of at least 0, or -1: another one in every run", std::to_string(*field),
-          [line, field](const std::string& text) {
-            line->seed_from_clock = text == "-1";
-            if (line->seed_from_clock) return true;
-            // lexical_cast takes -2 for a great number.
-            const std::optional<std::uint64_t> value = Number<std::uint64_t>(text);
-            if (!value || text.find('-') != std::string::npos) return false;
-            *field = *value;
-            return true;
-          }};
-}
-
-enum class Zero { kAllowed, kNotAllowed };
-
-Value DoubleOf(double* field, Zero zero) {
-  const bool allowed = zero == Zero::kAllowed;
-  return {allowed ? "a number of at least 0" : "a number greater than 0", Text(*field),
-          [field, allowed](const std::string& text) {
-            const std::optional<double> value = Number<double>(text);
-            if (!value || !std::isfinite(*value) || *value < 0 || (!allowed && *value == 0)) {
-              return false;
-            }
-            *field = *value;
-            return true;
-          }};
-}
-
-// std::string or a path.
-template <typename T>
-Value TextOf(T* field, const std::string& values, OptionRow::Path path = OptionRow::Path::kFile) {
-  return {values,
-          std::string(*field),
-          [field](const std::string& text) {
-            *field = text;
-            return !text.empty();
-          },
-          {},
-          path};
-}
-
-template <typename Enum>
-Value OneOf(Enum* field, const Names<Enum>& names) {
-  Value value;
-  for (const auto& [name, entry] : names) {
-    if (entry == *field) value.default_value = name;
-    value.values += (value.values.empty() ? "one of " : ", ") + name;
-    value.choices.push_back(name);
-  }
-  value.read = [field, &names](const std::string& text) {
-    const auto found = names.find(text);
-    if (found != names.end()) *field = found->second;
-    return found != names.end();
-  };
-  return value;
-}
-
-// Nothing is as good as not given.
-template <typename T>
-Value TextOrNothingOf(T* field, const std::string& values) {
-  return {values + ", or nothing",
-          "",
-          [field](const std::string& text) {
-            *field = text;
-            return true;
-          },
-          {},
-          OptionRow::Path::kFile};
-}
-
-Value Anything() {
-  return {"anything", "", [](const std::string&) { return true; }};
 }
 
 class Table {
@@ -256,60 +83,39 @@ class Table {
   }
 
   // The value goes to COLMAP as it was checked here.
-  OptionRow& AddPassedOn(std::vector<ColmapSpelling> colmap,
-                         const std::function<bool(std::string*)>& check, const std::string& values,
-                         const std::string& help) {
+  OptionRow& PassOn(std::vector<ColmapSpelling> colmap, CheckedText text, const std::string& help) {
     const std::string& name = colmap.back().name.empty() ? colmap.front().name : colmap.back().name;
     std::map<std::string, std::string>* options = &line_->pipeline.verification.colmap_options;
-    const Value value = {values, "", [options, key = name, check](const std::string& text) {
-                           std::string checked = text;
-                           if (!check(&checked)) return false;
-                           (*options)[key] = checked;
-                           return true;
-                         }};
-    return AddGrouped(Use::kPassedOn, std::move(colmap), value, help);
+    Value value;
+    value.values = std::move(text.values);
+    value.choices = std::move(text.choices);
+    value.read = [options, key = name, check = std::move(text.check)](const std::string& given) {
+      std::string checked = given;
+      if (!check(&checked)) return false;
+      (*options)[key] = checked;
+      return true;
+    };
+    return AddGrouped(Use::kPassedOn, std::move(colmap), std::move(value), help);
   }
 
   OptionRow& PassBool(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    const auto check = [](std::string* text) {
-      const std::optional<bool> value = ParseBool(*text);
-      if (value) *text = *value ? "1" : "0";
-      return value.has_value();
-    };
-    OptionRow& row = AddPassedOn(std::move(colmap), check, "0 or 1", help);
-    row.choices = kBoolChoices;
-    return row;
+    return PassOn(std::move(colmap), BoolText(), help);
   }
 
   OptionRow& PassInt(std::vector<ColmapSpelling> colmap, int minimum, const std::string& help) {
-    const auto check = [minimum](std::string* text) {
-      const std::optional<int> value = Number<int>(*text);
-      return value && *value >= minimum;
-    };
-    return AddPassedOn(std::move(colmap), check,
-                       "an integer of at least " + std::to_string(minimum), help);
+    return PassOn(std::move(colmap), IntText(minimum), help);
   }
 
-  // From 0 to 1.
   OptionRow& PassShare(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    const auto check = [](std::string* text) {
-      const std::optional<double> value = Number<double>(*text);
-      return value && *value >= 0 && *value <= 1;
-    };
-    return AddPassedOn(std::move(colmap), check, "a number from 0 to 1", help);
+    return PassOn(std::move(colmap), ShareText(), help);
   }
 
   OptionRow& PassPixels(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    const auto check = [](std::string* text) {
-      const std::optional<double> value = Number<double>(*text);
-      return value && std::isfinite(*value) && *value > 0;
-    };
-    return AddPassedOn(std::move(colmap), check, "a number greater than 0", help);
+    return PassOn(std::move(colmap), PositiveText(), help);
   }
 
   OptionRow& PassText(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return AddPassedOn(
-        std::move(colmap), [](std::string*) { return true; }, "a text", help);
+    return PassOn(std::move(colmap), AnyText(), help);
   }
 
   void AddUnused(std::vector<ColmapSpelling> colmap, const std::string& why) {
@@ -347,7 +153,7 @@ void Table::AddGeneral() {
       "the COLMAP program: a path, or a name on PATH");
   AddColmap(
       Use::kHere, {{{3, 8}, "random_seed", "0"}, {{3, 13}, "default_random_seed", "0"}},
-      SeedOf(line_),
+      SeedOf(&p.seed, &line_->seed_from_clock),
       "seed (>= 0) of this program's random choices, and handed on to COLMAP; -1: another one "
       "in every run");
 }
@@ -355,7 +161,7 @@ void Table::AddGeneral() {
 void Table::AddGraph() {
   PipelineOptions& p = line_->pipeline;
   Section("GraphMatch: which pairs are tested");
-  Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategies),
+  Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategyWords),
       "which pairs are tested: those that graphmatch finds; for comparison sampling or propagation "
       "(after one sampling) alone, retrieval: the nearest images of each, briad: retrieval and "
       "query "
@@ -405,7 +211,7 @@ void Table::AddVectors() {
   ImageRankingOptions& ranking = line_->pipeline.ranking;
   ImageVectorOptions& vectors = ranking.vectors;
   Section("GraphMatch: how images are described");
-  Add("GraphMatching.descriptor", OneOf(&vectors.descriptor, kDescriptors),
+  Add("GraphMatching.descriptor", OneOf(&vectors.descriptor, kDescriptorWords),
       "what describes an image: Fisher vectors of its features; for comparison VLAD of them, GIST "
       "of the photo, or vectors of another program from a file");
   Add("image_path",
@@ -433,7 +239,7 @@ void Table::AddMatching() {
   PipelineOptions& p = line_->pipeline;
   ExactMatcherOptions& exact = p.verification.exact;
   Section("GraphMatch: how descriptors are matched");
-  Add("GraphMatching.matcher", OneOf(&p.verification.matcher, kMatchers),
+  Add("GraphMatching.matcher", OneOf(&p.verification.matcher, kMatcherWords),
       "exact: by this program; colmap: by COLMAP; auto: by COLMAP if it has a GPU and use_gpu is "
       "on, else exact");
   Add("GraphMatching.cache_gb", DoubleOf(&exact.cache_gb, Zero::kAllowed),
@@ -493,7 +299,7 @@ void Table::AddLog() {
             IntOf(&log.verbosity, 0),
             "how much is logged; from 3 on every stage of every iteration has a line");
   AddColmap(Use::kHere, {{{4, 0}, "log_target", "stderr_and_file"}},
-            OneOf(&log.target, kLogTargets),
+            OneOf(&log.target, kLogTargetWords),
             "where the log goes: the standard error output, and with log_path that file. Errors "
             "that end the program are on the standard error output in any case");
   AddColmap(Use::kHere, {{{4, 0}, "log_path", ""}},
@@ -525,13 +331,7 @@ void Table::AddColmapMatching() {
   AddGrouped(Use::kHere,
              {{{3, 13}, "FeatureMatching.type", "SIFT"},
               {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},
-             {"one of SIFT, SIFT_BRUTEFORCE, SIFT_LIGHTGLUE: only SIFT features are matched",
-              "",
-              [line = line_](const std::string& text) {
-                line->lightglue = text == "SIFT_LIGHTGLUE";
-                return line->lightglue || text == "SIFT_BRUTEFORCE" || text == "SIFT";
-              },
-              {"SIFT", "SIFT_BRUTEFORCE", "SIFT_LIGHTGLUE"}},
+             FeatureTypeOf(&line_->lightglue),
              "how descriptors are matched; SIFT_LIGHTGLUE: by COLMAP 4");
   AddGrouped(Use::kHere, {{{3, 8}, "SiftMatching.max_ratio", "0.8"}},
              DoubleOf(&matching.max_ratio, Zero::kNotAllowed),
@@ -642,18 +442,6 @@ void Table::AddUnusedOptions() {
 }
 
 }  // namespace
-
-std::optional<bool> ParseBool(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* word : {"1", "true", "yes", "on"}) {
-    if (text == word) return true;
-  }
-  for (const char* word : {"0", "false", "no", "off"}) {
-    if (text == word) return false;
-  }
-  return std::nullopt;
-}
 
 const ColmapSpelling* OptionRow::In(const ColmapVersion& version) const {
   const ColmapSpelling* found = nullptr;

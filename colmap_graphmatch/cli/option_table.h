@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -74,10 +73,6 @@ std::string WithDashes(const std::string& name);
 
 // "3.8".
 std::string ToString(const ColmapVersion& version);
-
-// The words for truth that COLMAP understands, in any case (Boost.Program_options' own): true, yes,
-// on, 1 and their opposites.
-std::optional<bool> ParseBool(std::string text);
 
 // The table. Its rows store what they read in `line`, which must outlive them; defaults are those
 // of `line` as it is now.

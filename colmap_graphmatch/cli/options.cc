@@ -18,6 +18,7 @@
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/input_file.h"
 #include "colmap_graphmatch/cli/option_table.h"
+#include "colmap_graphmatch/cli/option_values.h"
 #include "colmap_graphmatch/cli/run_files.h"
 
 namespace colmap_graphmatch {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/base/enum_words.h"
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/options.h"
@@ -85,6 +86,14 @@ struct PipelineOptions {
   // Throws OptionsError.
   void Check() const;
 };
+
+inline constexpr EnumWords<PipelineOptions::Strategy, 6> kStrategyWords = {
+    {{PipelineOptions::Strategy::kGraphMatch, "graphmatch"},
+     {PipelineOptions::Strategy::kSampling, "sampling"},
+     {PipelineOptions::Strategy::kPropagation, "propagation"},
+     {PipelineOptions::Strategy::kRetrieval, "retrieval"},
+     {PipelineOptions::Strategy::kBriad, "briad"},
+     {PipelineOptions::Strategy::kExhaustive, "exhaustive"}}};
 
 // Two images that look alike.
 struct CandidatePair {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_graphmatch/base/enum_words.h"
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/database/database.h"
@@ -49,6 +50,12 @@ struct ImageVectorOptions {
   // Throws OptionsError.
   void Check() const;
 };
+
+inline constexpr EnumWords<ImageVectorOptions::Descriptor, 4> kDescriptorWords = {
+    {{ImageVectorOptions::Descriptor::kFisher, "fisher"},
+     {ImageVectorOptions::Descriptor::kVlad, "vlad"},
+     {ImageVectorOptions::Descriptor::kGist, "gist"},
+     {ImageVectorOptions::Descriptor::kFile, "file"}}};
 
 bool HasMixture(ImageVectorOptions::Descriptor descriptor);
 

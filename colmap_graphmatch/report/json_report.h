@@ -3,13 +3,12 @@
 #include <filesystem>
 #include <string>
 
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/report/report_data.h"
 
 namespace colmap_graphmatch {
 
-// What a run found and what it cost, for other programs: a JSON object, the members of which
-// docs/formats.md describes.
-std::string MakeJsonReport(const PipelineOptions& options, const PipelineResult& result);
+// A report for other programs: a JSON object, the members of which docs/formats.md describes.
+std::string MakeJsonReport(const ReportData& data);
 
 // Whether the report at such a path is a page: its name ends in .html or .htm.
 bool IsPage(const std::filesystem::path& report_path);

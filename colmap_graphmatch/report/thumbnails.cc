@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -15,8 +14,6 @@
 namespace colmap_graphmatch {
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr int kLongestSide = 128;  // In pixels.
 constexpr int kQuality = 70;       // Of JPEG, up to 100.
 
@@ -25,7 +22,6 @@ class Choice {
  public:
   explicit Choice(std::size_t limit) : limit_(limit) {}
 
-  void Add(const Json& image) { Add(image.get<std::size_t>()); }
   void Add(std::size_t image) {
     if (images_.size() < limit_) images_.insert(image);
   }
@@ -37,35 +33,33 @@ class Choice {
   std::set<std::size_t> images_;
 };
 
-void AddListedImages(const Json& report, Choice* choice) {
-  for (const Json& image : report.at("images_without_edge")) {
-    choice->Add(image.at("image"));
-    for (const Json& candidate : image.at("candidates")) choice->Add(candidate.at("image"));
+void AddListedImages(const ReportDetails& details, Choice* choice) {
+  const auto add_ends = [&](std::size_t edge) {
+    choice->Add(details.edges[edge].a);
+    choice->Add(details.edges[edge].b);
+  };
+  for (const ReportDetails::ImageAlone& alone : details.images_without_edge) {
+    choice->Add(alone.image);
+    for (const ReportDetails::Candidate& candidate : alone.candidates) choice->Add(candidate.image);
   }
-  for (const Json& bridge : report.at("bridges")) {
-    for (const Json& image : bridge.at("images")) choice->Add(image);
-  }
-  for (const Json& point : report.at("articulation_points")) choice->Add(point.at("image"));
-  for (const Json& link : report.at("weak_links")) {
-    for (const Json& edge : link.at("edges")) {
-      choice->Add(edge.at(0));
-      choice->Add(edge.at(1));
-    }
+  for (const Bridge& bridge : details.bridges) add_ends(bridge.edge);
+  for (const ArticulationPoint& point : details.articulation_points) choice->Add(point.vertex);
+  for (const WeakLink& link : details.weak_links) {
+    for (const std::size_t edge : link.edges) add_ends(edge);
   }
 }
 
 // First one of every component, then the next of every component, so that none is left without.
-void AddBestConnectedImages(const Json& report, std::size_t num_images, Choice* choice) {
-  std::vector<std::size_t> degrees(num_images, 0);
-  for (const Json& edge : report.at("edge_list")) {
-    ++degrees.at(edge.at(0).get<std::size_t>());
-    ++degrees.at(edge.at(1).get<std::size_t>());
+void AddBestConnectedImages(const ReportDetails& details, Choice* choice) {
+  std::vector<std::size_t> degrees(details.images.size(), 0);
+  for (const GraphEdge& edge : details.edges) {
+    ++degrees[edge.a];
+    ++degrees[edge.b];
   }
-  std::vector<std::vector<std::size_t>> components =
-      report.at("connected_components").get<std::vector<std::vector<std::size_t>>>();
+  std::vector<std::vector<std::size_t>> components = details.components;
   for (std::vector<std::size_t>& component : components) {
     std::stable_sort(component.begin(), component.end(),
-                     [&](std::size_t a, std::size_t b) { return degrees.at(a) > degrees.at(b); });
+                     [&](std::size_t a, std::size_t b) { return degrees[a] > degrees[b]; });
   }
   bool any = true;
   for (std::size_t rank = 0; any && !choice->Full(); ++rank) {
@@ -111,19 +105,18 @@ std::string MakeThumbnail(const std::filesystem::path& directory, const std::str
 
 }  // namespace
 
-std::vector<std::pair<std::size_t, std::string>> ChooseThumbnails(const std::string& json,
+std::vector<std::pair<std::size_t, std::string>> ChooseThumbnails(const ReportDetails& details,
                                                                   std::size_t max_num_thumbnails) {
-  const Json report = Json::parse(json);
-  const std::vector<std::string> names = report.at("image_names").get<std::vector<std::string>>();
+  const std::vector<ImageRecord>& all = details.images;
   Choice choice(max_num_thumbnails);
-  if (names.size() <= max_num_thumbnails) {
-    for (std::size_t i = 0; i < names.size(); ++i) choice.Add(i);
+  if (all.size() <= max_num_thumbnails) {
+    for (std::size_t i = 0; i < all.size(); ++i) choice.Add(i);
   } else {
-    AddListedImages(report, &choice);
-    AddBestConnectedImages(report, names.size(), &choice);
+    AddListedImages(details, &choice);
+    AddBestConnectedImages(details, &choice);
   }
   std::vector<std::pair<std::size_t, std::string>> images;
-  for (const std::size_t image : choice.Images()) images.emplace_back(image, names.at(image));
+  for (const std::size_t image : choice.Images()) images.emplace_back(image, all[image].name);
   return images;
 }
 

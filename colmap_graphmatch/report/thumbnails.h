@@ -9,16 +9,16 @@
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/report/report_data.h"
 
 namespace colmap_graphmatch {
 
-// The images that a page with this report (docs/formats.md) shows thumbnails of, by index and name,
-// ascending: all up to max_num_thumbnails; of more, those that its lists show, most telling first:
-// images without an edge and their nearest candidates, the ends of bridges, articulation points,
-// the ends of weak links, then of every component, largest first, the images with most neighbours.
-// Throws nlohmann's exceptions for what is no such report.
+// The images that the page of a report shows thumbnails of, by index and name, ascending: all up to
+// max_num_thumbnails; of more, those that its lists show, most telling first: images without an
+// edge and their nearest candidates, the ends of bridges, articulation points, the ends of weak
+// links, then of every component, largest first, the images with most neighbours.
 std::vector<std::pair<std::size_t, std::string>> ChooseThumbnails(
-    const std::string& json, std::size_t max_num_thumbnails = 1000);
+    const ReportDetails& details, std::size_t max_num_thumbnails = 1000);
 
 // JPEG files of at most 128 x 128 pixels of the images (index and name, a path below image_path),
 // by index. The orientation that a camera has noted is honoured. Files that are missing or cannot

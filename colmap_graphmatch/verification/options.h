@@ -3,6 +3,7 @@
 #include <map>
 #include <string>
 
+#include "colmap_graphmatch/base/enum_words.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/exact_matcher.h"
 
@@ -50,6 +51,11 @@ struct VerificationOptions {
   // Throws OptionsError.
   void Check() const;
 };
+
+inline constexpr EnumWords<VerificationOptions::Matcher, 3> kMatcherWords = {
+    {{VerificationOptions::Matcher::kAuto, "auto"},
+     {VerificationOptions::Matcher::kExact, "exact"},
+     {VerificationOptions::Matcher::kColmap, "colmap"}}};
 
 // The value of an option in colmap_options, in whatever group it was given, or null.
 const std::string* FindOption(const std::map<std::string, std::string>& options,

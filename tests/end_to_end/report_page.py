@@ -54,8 +54,8 @@ def make_report(names, components, edges, nonedges=(), without_edge=(), **member
                          propagation=stage(tested - sampled, len(edges) - sampled_edges, seconds=100.0))],
         image_names=names, image_ids=[2 * i + 1 for i in range(len(names))],
         num_features=[1000 + i for i in range(len(names))], connected_components=components, edge_list=edges,
-        nonedge_list=[image for pair in nonedges for image in pair], discovery=discovery, articulation_points=[],
-        num_articulation_points=0, bridges=[], num_bridges=0, weak_links=[], images_without_edge=list(without_edge))
+        nonedge_list=[image for pair in nonedges for image in pair], nonedges_left_out=0, discovery=discovery,
+        articulation_points=[], num_articulation_points=0, bridges=[], num_bridges=0, weak_links=[], images_without_edge=list(without_edge))
     for entry in without_edge:
         report['num_features'][entry['image']] = entry['features']
     report.update(members)
@@ -349,6 +349,12 @@ class PageTest(unittest.TestCase):
             self.press(Keys.ESCAPE)
         self.open_bubble(1)
         self.assertEqual(self.script(tags), 0)
+
+    def test_pairs_that_are_left_out(self):
+        self.open(rich_report())
+        self.assertIn('tested, no edgenot tested', self.text('#adjacency-legend'))
+        self.open(dict(rich_report(), nonedges_left_out=1996))
+        self.assertIn('tested, no edge (of 2,000 such pairs 4 are drawn)', self.text('#adjacency-legend'))
 
     def test_thumbnails(self):
         report = rich_report()

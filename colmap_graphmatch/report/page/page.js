@@ -1171,8 +1171,11 @@ function drawAdjacency() {
 }
 
 function showAdjacencyLegend() {
+  const drawn = report.nonedge_list.length / 2;
+  const leftOut = report.nonedges_left_out || 0;
   byId('adjacency-legend').append(legendItem(swatch('edge'), 'edge'),
-    legendItem(swatch('tested'), 'tested, no edge'),
+    legendItem(swatch('tested'), 'tested, no edge' +
+      (leftOut > 0 ? ` (of ${count(drawn + leftOut)} such pairs ${count(drawn)} are drawn)` : '')),
     legendItem(element('span.swatch', {style: 'background: var(--untested); border: 1px solid var(--line)'}),
       'not tested'),
     legendItem(element('span.swatch', {style: 'border: 2px solid var(--frame)'}), 'a component'));
