@@ -71,7 +71,8 @@ Bytes ReadAll(const std::filesystem::path& path, const OpenedFile& file) {
   if (!S_ISREG(file.status.st_mode)) {
     throw UnreadableFileError(path, DescribeKind(file.status.st_mode));
   }
-  Bytes bytes(static_cast<std::size_t>(file.status.st_size), 0);
+  // With room for the end to be found.
+  Bytes bytes(static_cast<std::size_t>(file.status.st_size) + 1, 0);
   std::size_t num_read = 0;
   while (true) {
     if (num_read == bytes.size()) bytes.resize(num_read + 4096);  // It may be growing.

@@ -55,7 +55,7 @@ struct ShardRunner::Batch : public ShardRunner::Progress {
   std::condition_variable changed;         // finished, num_workers or abort.
   std::deque<Shard> shards;                // Not yet taken.
   std::deque<ShardPart> finished;          // Not yet merged.
-  std::unordered_set<ImagePair> answered;  // All pairs that have been finished.
+  std::unordered_set<ImagePair> answered;  // Finished pairs of the shards under way.
   std::size_t num_workers = 0;
   bool last_has_put_back = false;  // The last worker met a limit of the system, and tried again.
   std::size_t num_limited = 0;     // Workers that ended since the system has no room for them.
@@ -97,6 +97,8 @@ bool ShardRunner::WorkOnNext(Batch* batch, Shard* shard) const {
     batch->shards.pop_front();
   }
   batch->work(*shard, *batch);
+  const std::lock_guard<std::mutex> lock(batch->mutex);
+  for (const ImagePair& pair : *shard) batch->answered.erase(pair);
   return true;
 }
 
