@@ -70,7 +70,7 @@ class Preparations:
 
     def render(self) -> None:
         """One place with enough photos for a model, and three photos of another, which are not."""
-        subprocess.run([self.build / "tests/synthetic_photos/render_photos", "--output_path", self.work / "rendered",
+        subprocess.run([self.build / "scripts/photo_renderer/render_photos", "--output_path", self.work / "rendered",
                         "--truth_path", self.work / "cameras.tsv"], check=True, stdout=subprocess.DEVNULL)
         names: typing.Dict[str, typing.List[str]] = {}
         for line in (self.work / "cameras.tsv").read_text().splitlines()[2:]:
@@ -176,7 +176,7 @@ def main() -> None:
     if not shutil.which("colmap"):
         print("COLMAP is not installed.")
         sys.exit(77)
-    if not (build / "tests/synthetic_photos/render_photos").exists():
+    if not (build / "scripts/photo_renderer/render_photos").exists():
         print("There is no render_photos: the build is one without GRAPHMATCH_BUILD_DEMO.")
         sys.exit(77)
     shutil.rmtree(work, ignore_errors=True)

@@ -11,7 +11,7 @@ if [[ -f $photos/dev.scenes.tsv ]]; then
   awk -F '\t' '$2 ~ /^(entry|fountain)$/ { print $1 }' "$photos/dev.scenes.tsv" |
     while read -r name; do cp "$photos/dev/$name" "$work/images/"; done
 else
-  "$build/tests/synthetic_photos/render_photos" --output_path "$work/rendered" >/dev/null
+  "$build/scripts/photo_renderer/render_photos" --output_path "$work/rendered" >/dev/null
   find "$work/rendered" -name '*.jpg' | sort | head -n 20 | xargs -I {} cp {} "$work/images/"
 fi
 extract "$work/exact.db" "$work/images" 1500 3200

@@ -85,9 +85,9 @@ sqlite3 "$work/grown.db" "ATTACH '$work/new.db' AS new;
 kill_until_done grown "$work/grown.db" 15 700 "$matcher" --colmap_path "$fake"
 unset FAKE_COLMAP_DELAY_MS
 
-if [[ -x $build/tests/synthetic_photos/render_photos ]] && command -v colmap >/dev/null; then
+if [[ -x $build/scripts/photo_renderer/render_photos ]] && command -v colmap >/dev/null; then
   echo "== With the installed COLMAP"
-  "$build/tests/synthetic_photos/render_photos" --output_path "$work/rendered" >"$work/render.log"
+  "$build/scripts/photo_renderer/render_photos" --output_path "$work/rendered" >"$work/render.log"
   extract "$work/real.db" "$work/rendered" 1024 640
   kill_until_done real "$work/real.db" 12 990 "$matcher"
 else

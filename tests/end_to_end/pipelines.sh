@@ -12,7 +12,7 @@ database=$work/database.db
 mapped=$work/mapped.db
 
 # Enough photos of one monument for a model, and a few of another, which are not.
-"$build/tests/synthetic_photos/render_photos" --output_path "$work/rendered" --truth_path "$work/cameras.tsv"
+"$build/scripts/photo_renderer/render_photos" --output_path "$work/rendered" --truth_path "$work/cameras.tsv"
 mkdir -p "$images"
 wanted=(11 3 0)
 while IFS=$'\t' read -r name monument _; do

@@ -18,7 +18,7 @@ for model in "$work"/demo/sparse/*/; do
   colmap model_converter --input_path "$model" --output_path "$text" --output_type TXT >/dev/null 2>&1
   models+=(--model_path "$text")
 done
-"$build/tests/synthetic_photos/compare_cameras" --truth_path "$work/demo/cameras.tsv" "${models[@]}"
+"$build/scripts/photo_renderer/compare_cameras" --truth_path "$work/demo/cameras.tsv" "${models[@]}"
 
 # Less than exhaustive matching, and no edge between monuments.
 tested=$(count_tested "$work/demo/database.db")

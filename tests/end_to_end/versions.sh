@@ -141,7 +141,7 @@ if [[ ! -d $shared/images ]]; then
     awk -F '\t' '$2 == "fountain" || $2 == "herzjesu" && n++ < 3 { print $1 }' "$photos/dev.scenes.tsv" |
       while read -r name; do cp "$photos/dev/$name" "$work/images/"; done
   else
-    "$build/tests/synthetic_photos/render_photos" --output_path "$work/rendered" >/dev/null
+    "$build/scripts/photo_renderer/render_photos" --output_path "$work/rendered" >/dev/null
     awk -F '\t' '$2 == "0" || $2 == "1" && n++ < 3 { print $1 }' "$work/cameras.tsv" |
       while read -r name; do cp "$work/rendered/$name" "$work/images/"; done
     echo --ImageReader.single_camera 1 --ImageReader.camera_model PINHOLE \

@@ -1,4 +1,4 @@
-#include "tests/synthetic_photos/cameras.h"
+#include "scripts/photo_renderer/cameras.h"
 
 #include <cmath>
 #include <cstdio>
@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "tests/synthetic_photos/hashing.h"
+#include "scripts/photo_renderer/hashing.h"
 
 namespace colmap_graphmatch::synthetic {
 namespace {

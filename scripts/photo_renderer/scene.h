@@ -1,13 +1,12 @@
 // Solids, and the colour of what a ray through them sees.
 
-#ifndef TESTS_SYNTHETIC_PHOTOS_SCENE_H_
-#define TESTS_SYNTHETIC_PHOTOS_SCENE_H_
+#pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
-#include "tests/synthetic_photos/texture.h"
+#include "scripts/photo_renderer/texture.h"
 
 namespace colmap_graphmatch::synthetic {
 
@@ -73,5 +72,3 @@ class Scene {
 };
 
 }  // namespace colmap_graphmatch::synthetic
-
-#endif  // TESTS_SYNTHETIC_PHOTOS_SCENE_H_

@@ -1,8 +1,7 @@
 // Stateless randomness: every random quantity is a hash of what it belongs to, so that pictures do
 // not depend on the order in which threads draw them.
 
-#ifndef TESTS_SYNTHETIC_PHOTOS_HASHING_H_
-#define TESTS_SYNTHETIC_PHOTOS_HASHING_H_
+#pragma once
 
 #include <cstdint>
 
@@ -40,5 +39,3 @@ class HashSequence {
 };
 
 }  // namespace colmap_graphmatch::synthetic
-
-#endif  // TESTS_SYNTHETIC_PHOTOS_HASHING_H_

@@ -1,9 +1,8 @@
-#ifndef TESTS_SYNTHETIC_PHOTOS_MONUMENTS_H_
-#define TESTS_SYNTHETIC_PHOTOS_MONUMENTS_H_
+#pragma once
 
 #include <cstdint>
 
-#include "tests/synthetic_photos/scene.h"
+#include "scripts/photo_renderer/scene.h"
 
 namespace colmap_graphmatch::synthetic {
 
@@ -13,5 +12,3 @@ namespace colmap_graphmatch::synthetic {
 Scene BuildMonument(int index, uint32_t seed);
 
 }  // namespace colmap_graphmatch::synthetic
-
-#endif  // TESTS_SYNTHETIC_PHOTOS_MONUMENTS_H_

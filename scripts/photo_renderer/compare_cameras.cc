@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/synthetic_photos/cameras.h"
+#include "scripts/photo_renderer/cameras.h"
 
 namespace colmap_graphmatch::synthetic {
 namespace {

@@ -1,11 +1,11 @@
-#include "tests/synthetic_photos/scene.h"
+#include "scripts/photo_renderer/scene.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "tests/synthetic_photos/hashing.h"
+#include "scripts/photo_renderer/hashing.h"
 
 namespace colmap_graphmatch::synthetic {
 namespace {

@@ -1,8 +1,7 @@
 // Procedural stone textures that never repeat: each stone, stain and painted dot is hashed from its
 // place on the surface.
 
-#ifndef TESTS_SYNTHETIC_PHOTOS_TEXTURE_H_
-#define TESTS_SYNTHETIC_PHOTOS_TEXTURE_H_
+#pragma once
 
 #include <Eigen/Core>
 #include <array>
@@ -42,5 +41,3 @@ Eigen::Vector3f SurfaceColor(const Material& material, const SurfacePoint& point
                              float footprint);
 
 }  // namespace colmap_graphmatch::synthetic
-
-#endif  // TESTS_SYNTHETIC_PHOTOS_TEXTURE_H_

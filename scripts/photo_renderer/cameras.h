@@ -1,7 +1,6 @@
 // The cameras that took the photos, and the file that records them.
 
-#ifndef TESTS_SYNTHETIC_PHOTOS_CAMERAS_H_
-#define TESTS_SYNTHETIC_PHOTOS_CAMERAS_H_
+#pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -44,5 +43,3 @@ void WriteTruth(const std::string& path, const Truth& truth);
 Truth ReadTruth(const std::string& path);
 
 }  // namespace colmap_graphmatch::synthetic
-
-#endif  // TESTS_SYNTHETIC_PHOTOS_CAMERAS_H_

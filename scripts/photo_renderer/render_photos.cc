@@ -15,10 +15,10 @@
 #include <thread>
 #include <vector>
 
-#include "tests/synthetic_photos/cameras.h"
-#include "tests/synthetic_photos/jpeg_writer.h"
-#include "tests/synthetic_photos/monuments.h"
-#include "tests/synthetic_photos/scene.h"
+#include "scripts/photo_renderer/cameras.h"
+#include "scripts/photo_renderer/jpeg_writer.h"
+#include "scripts/photo_renderer/monuments.h"
+#include "scripts/photo_renderer/scene.h"
 
 namespace colmap_graphmatch::synthetic {
 namespace {

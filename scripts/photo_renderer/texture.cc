@@ -1,10 +1,10 @@
-#include "tests/synthetic_photos/texture.h"
+#include "scripts/photo_renderer/texture.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "tests/synthetic_photos/hashing.h"
+#include "scripts/photo_renderer/hashing.h"
 
 namespace colmap_graphmatch::synthetic {
 namespace {

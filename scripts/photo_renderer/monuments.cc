@@ -1,11 +1,11 @@
-#include "tests/synthetic_photos/monuments.h"
+#include "scripts/photo_renderer/monuments.h"
 
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
-#include "tests/synthetic_photos/hashing.h"
+#include "scripts/photo_renderer/hashing.h"
 
 namespace colmap_graphmatch::synthetic {
 namespace {

@@ -1,5 +1,4 @@
-#ifndef TESTS_SYNTHETIC_PHOTOS_JPEG_WRITER_H_
-#define TESTS_SYNTHETIC_PHOTOS_JPEG_WRITER_H_
+#pragma once
 
 #include <cstdint>
 #include <string>
@@ -12,5 +11,3 @@ void WriteJpeg(const std::string& path, int width, int height, int quality,
                const std::vector<uint8_t>& rgb);
 
 }  // namespace colmap_graphmatch::synthetic
-
-#endif  // TESTS_SYNTHETIC_PHOTOS_JPEG_WRITER_H_

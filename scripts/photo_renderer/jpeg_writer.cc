@@ -1,4 +1,4 @@
-#include "tests/synthetic_photos/jpeg_writer.h"
+#include "scripts/photo_renderer/jpeg_writer.h"
 
 // jpeglib.h needs FILE and size_t to be declared before it.
 #include <cstdio>
