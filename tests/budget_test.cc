@@ -8,7 +8,7 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/pipeline/budgeted_verifier.h"
-#include "colmap_graphmatch/pipeline/run_record.h"
+#include "colmap_graphmatch/pipeline/details_recorder.h"
 #include "support/recording_verifier.h"
 
 namespace colmap_graphmatch {
@@ -149,8 +149,8 @@ LoopProgress Progress(LoopStage stage, int iteration, std::size_t tested, std::s
   return progress;
 }
 
-TEST(RunRecord, ALongCurveKeepsItsEndsAndThoseOfItsBatches) {
-  RunRecord record;
+TEST(DetailsRecorder, ALongCurveKeepsItsEndsAndThoseOfItsBatches) {
+  DetailsRecorder record;
   constexpr std::size_t kNum = 100000;
   for (std::size_t i = 1; i <= kNum; ++i) {
     const bool samples = i <= 3333;
@@ -159,8 +159,8 @@ TEST(RunRecord, ALongCurveKeepsItsEndsAndThoseOfItsBatches) {
                static_cast<double>(i));
   }
   const std::vector<DiscoveryPoint> points = record.Discovery();
-  EXPECT_LE(points.size(), RunRecord::kMaxPoints + 1);
-  EXPECT_GE(points.size(), RunRecord::kMaxPoints / 3);
+  EXPECT_LE(points.size(), DetailsRecorder::kMaxPoints + 1);
+  EXPECT_GE(points.size(), DetailsRecorder::kMaxPoints / 3);
   std::set<std::size_t> tests;
   for (std::size_t i = 0; i < points.size(); ++i) {
     tests.insert(points[i].num_tested);
@@ -173,18 +173,18 @@ TEST(RunRecord, ALongCurveKeepsItsEndsAndThoseOfItsBatches) {
   EXPECT_THAT(record.Tested(), SizeIs(kNum));
 }
 
-TEST(RunRecord, ManySmallBatches) {
-  RunRecord record;
+TEST(DetailsRecorder, ManySmallBatches) {
+  DetailsRecorder record;
   for (std::size_t i = 1; i <= 300000; ++i) {
     record.Add(Progress(LoopStage::kPropagation, static_cast<int>(i), i, 0), 1);
   }
-  EXPECT_LE(record.Discovery().size(), RunRecord::kMaxPoints + 1);
-  EXPECT_GE(record.Discovery().size(), RunRecord::kMaxPoints / 4);
+  EXPECT_LE(record.Discovery().size(), DetailsRecorder::kMaxPoints + 1);
+  EXPECT_GE(record.Discovery().size(), DetailsRecorder::kMaxPoints / 4);
   EXPECT_EQ(record.Discovery().back().num_tested, 300000U);
 }
 
-TEST(RunRecord, KnownPairsOfImagesThatAreGoneAreLeftOut) {
-  RunRecord record;
+TEST(DetailsRecorder, KnownPairsOfImagesThatAreGoneAreLeftOut) {
+  DetailsRecorder record;
   LoopProgress progress = Progress(LoopStage::kSampling, 0, 1, 1);
   record.Add(progress, 1);
   progress.last = {ImagePair(1, 3), PairOutcome::kNoEdge, 0};

@@ -466,9 +466,10 @@ TEST(Summary, OfARunThatABudgetEnded) {
 
 TEST(Summary, OfListedPairsHasNoStages) {
   PipelineResult result = MakeResult();
-  result.listed = true;
+  PipelineOptions options;
+  options.strategy = PipelineOptions::Strategy::kExhaustive;
   result.stopped_by = PipelineResult::StoppedBy::kNothing;
-  const std::string text = FormatSummary(PipelineOptions(), result);
+  const std::string text = FormatSummary(options, result);
   EXPECT_THAT(text, Not(HasSubstr("listed")));
   EXPECT_THAT(text, Not(HasSubstr("ranking")));
   EXPECT_THAT(text, HasSubstr("\nTime               96.5 s\n"));

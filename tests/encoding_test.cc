@@ -112,7 +112,7 @@ TEST(FisherVector, TakesDescriptorsOfAnyDimension) {
     GmmOptions options;
     options.num_components = 3;
     const RowMatrixXf samples = MakeSamples(500, dim, 6);
-    const FisherVectorEncoder encoder(TrainGmm(options, samples, threads).mixture);
+    const FisherVectorEncoder encoder(TrainGmm(options, 0, samples, threads).mixture);
     EXPECT_EQ(encoder.Dim(), 2 * 3 * dim);
     EXPECT_NEAR(encoder.Encode(samples.topRows(50)).norm(), 1, 1e-5);
   }

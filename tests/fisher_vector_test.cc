@@ -40,7 +40,7 @@ GaussianMixture SiftMixture(const RowMatrixXf& samples) {
   ThreadPool threads(2);
   GmmOptions options;
   options.max_num_iterations = 10;
-  return TrainGmm(options, samples, threads).mixture;
+  return TrainGmm(options, 0, samples, threads).mixture;
 }
 
 void ExpectGradientOfTheReference(const GaussianMixture& mixture, const RowMatrixXf& descriptors) {

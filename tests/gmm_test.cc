@@ -59,9 +59,10 @@ void ExpectValid(const GaussianMixture& mixture, double variance_floor) {
   EXPECT_GE(mixture.variances.minCoeff(), variance_floor);
 }
 
-GmmTraining Train(const GmmOptions& options, const RowMatrixXf& samples, int num_threads = 2) {
+GmmTraining Train(const GmmOptions& options, const RowMatrixXf& samples, int num_threads = 2,
+                  std::uint64_t seed = 0) {
   ThreadPool threads(num_threads);
-  return TrainGmm(options, samples, threads);
+  return TrainGmm(options, seed, samples, threads);
 }
 
 // Exactly `num_iterations` updates.
@@ -365,8 +366,7 @@ TEST(TrainGmmTest, RecoversPlantedComponents) {
     SCOPED_TRACE(seed);
     GmmOptions options;
     options.num_components = kNumComponents;
-    options.seed = seed;
-    const GmmTraining training = Train(options, samples);
+    const GmmTraining training = Train(options, samples, 2, seed);
     const GaussianMixture& mixture = training.mixture;
     ExpectValid(mixture, options.variance_floor);
     ASSERT_EQ(mixture.NumComponents(), kNumComponents);
@@ -415,12 +415,10 @@ TEST(TrainGmmTest, TheSeedDecides) {
   const RowMatrixXf samples = SampleMixture(RandomMixture(9, 6, 4, 0, &random), 3000, &random);
   GmmOptions options;
   options.num_components = 5;
-  options.seed = 1;
-  const GmmTraining training = Train(options, samples);
-  ExpectExactlyEqual(Train(options, samples), training);
+  const GmmTraining training = Train(options, samples, 2, 1);
+  ExpectExactlyEqual(Train(options, samples, 2, 1), training);
 
-  options.seed = 2;
-  const GmmTraining other = Train(options, samples);
+  const GmmTraining other = Train(options, samples, 2, 2);
   EXPECT_FALSE(ExactlyEqual(other.mixture.means, training.mixture.means));
   ExpectValid(other.mixture, options.variance_floor);
   EXPECT_EQ(other.mixture.NumComponents(), 5);
@@ -525,9 +523,9 @@ TEST(TrainGmmTest, StopsOnRequest) {
   const RowMatrixXf samples = RowMatrixXf::Identity(4, 4);
   ThreadPool threads(2);
   StopRequest stop;
-  EXPECT_NO_THROW(TrainGmm(GmmOptions(), samples, threads, &stop));
+  EXPECT_NO_THROW(TrainGmm(GmmOptions(), 0, samples, threads, &stop));
   stop.Raise();
-  EXPECT_THROW(TrainGmm(GmmOptions(), samples, threads, &stop), StoppedError);
+  EXPECT_THROW(TrainGmm(GmmOptions(), 0, samples, threads, &stop), StoppedError);
 }
 
 // Three different samples, so that the start has one component at each. The smallest variance is so
@@ -627,19 +625,19 @@ TEST(GmmOptionsTest, InvalidOptionsAreRefused) {
   expect_refused(options);
 }
 
-TEST(GmmOptionsTest, EveryFieldChangesTheKey) {
-  std::set<std::string> keys = {GmmOptions().Key()};
+TEST(GmmOptionsTest, TheSeedAndEveryFieldChangeTheKey) {
+  std::set<std::string> keys = {GmmOptions().Key(0), GmmOptions().Key(16)};
+  EXPECT_EQ(keys.size(), 2U);
   const std::vector<void (*)(GmmOptions*)> changes = {
       [](GmmOptions* o) { o->num_components = 16; },
       [](GmmOptions* o) { o->tolerance = std::nextafter(o->tolerance, 1); },
       [](GmmOptions* o) { o->max_num_iterations = 16; },
-      [](GmmOptions* o) { o->variance_floor = std::nextafter(o->variance_floor, 1); },
-      [](GmmOptions* o) { o->seed = 16; }};
+      [](GmmOptions* o) { o->variance_floor = std::nextafter(o->variance_floor, 1); }};
   for (const auto& change : changes) {
     GmmOptions options;
     change(&options);
-    EXPECT_TRUE(keys.insert(options.Key()).second) << options.Key();
-    EXPECT_EQ(options.Key(), GmmOptions(options).Key());
+    EXPECT_TRUE(keys.insert(options.Key(0)).second) << options.Key(0);
+    EXPECT_EQ(options.Key(0), GmmOptions(options).Key(0));
   }
 }
 

@@ -143,13 +143,13 @@ TEST(Options, EveryFieldChangesTheKey) {
       [](GraphMatchOptions* o) { o->max_tests_for_sampling = 1; },
       [](GraphMatchOptions* o) { o->max_failed_samples = 1; },
       [](GraphMatchOptions* o) {
-        o->restrictions.seeking = {true, false};
+        o->restrictions.queries = {true, false};
       },
       [](GraphMatchOptions* o) {
-        o->restrictions.seeking = {true, true};
+        o->restrictions.queries = {true, true};
       },
       [](GraphMatchOptions* o) {
-        o->restrictions.seeking = {true, true, true};
+        o->restrictions.queries = {true, true, true};
       },
       [](GraphMatchOptions* o) {
         o->restrictions.frames = {0, 1};
@@ -268,7 +268,7 @@ TEST(Sampling, StopsAtTheBudget) {
   MatchingGraph graph(30);
   for (int i = 0; i < 3; ++i) {
     EXPECT_FALSE(sampler.Propose(i, graph).empty());
-    sampler.Charge();
+    sampler.Spend();
   }
   EXPECT_THAT(sampler.Propose(3, graph), IsEmpty());
 }
@@ -329,7 +329,7 @@ TEST(Propagation, CountsWhatItCouldProposeWithoutALimit) {
   GraphMatchOptions options;
   options.num_to_propagate = static_cast<int>(scene.num_vertices);
   for (std::size_t v = 0; v < scene.num_vertices; ++v) {
-    options.restrictions.seeking.push_back(v % 5 != 0);
+    options.restrictions.queries.push_back(v % 5 != 0);
     options.restrictions.frames.push_back(static_cast<std::uint32_t>(v / 2));
   }
   for (const int max_num_neighbors : {6, 120}) {
@@ -755,28 +755,28 @@ TEST(Loop, InterruptedAfterOtherMatchersItEndsAsIfItHadNotBeen) {
   }
 }
 
-TEST(Loop, OnlyImagesThatSeekLookForPartners) {
+TEST(Loop, OnlyQueryImagesLookForPartners) {
   const Scene scene = MakeScene(6, 14, 4, 0.7, 24);
   const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
   GraphMatchOptions options;
-  options.restrictions.seeking.resize(scene.num_vertices);
-  const std::set<Vertex> seeking = {3, 40, 41};
-  std::set<ImageId> seeking_ids;
-  for (const Vertex vertex : seeking) {
-    options.restrictions.seeking[vertex] = true;
-    seeking_ids.insert(ids[vertex]);
+  options.restrictions.queries.resize(scene.num_vertices);
+  const std::set<Vertex> queries = {3, 40, 41};
+  std::set<ImageId> query_ids;
+  for (const Vertex vertex : queries) {
+    options.restrictions.queries[vertex] = true;
+    query_ids.insert(ids[vertex]);
   }
   // The others have been matched: what they found leads on.
   RecordingVerifier verifier(ImageEdges(scene, ids));
   for (const ImagePair& pair : ImageEdges(scene, ids)) {
-    if (seeking_ids.count(pair.id1) + seeking_ids.count(pair.id2) == 0) verifier.known.insert(pair);
+    if (query_ids.count(pair.id1) + query_ids.count(pair.id2) == 0) verifier.known.insert(pair);
   }
   const ExplorationResult result = RunLoop(options, MakeRanking(scene), &verifier);
   EXPECT_THAT(verifier.tested, Not(IsEmpty()));
   for (const ImagePair& pair : verifier.tested) {
-    EXPECT_GT(seeking_ids.count(pair.id1) + seeking_ids.count(pair.id2), 0U);
+    EXPECT_GT(query_ids.count(pair.id1) + query_ids.count(pair.id2), 0U);
   }
-  for (const Vertex vertex : seeking) EXPECT_GT(result.graph.Degree(vertex), 3U);
+  for (const Vertex vertex : queries) EXPECT_GT(result.graph.Degree(vertex), 3U);
   EXPECT_GT(result.stages[LoopStage::kPropagation].num_tested, 0U);
 
   RecordingVerifier exhaustive(ImageEdges(scene, ids));
@@ -973,8 +973,8 @@ TEST(Retrieval, KeepsToItsRestrictions) {
   RetrievalOptions options;
   options.num_images = 4;
   options.num_expansions = 4;
-  options.restrictions.seeking.resize(scene.num_vertices);
-  options.restrictions.seeking[7] = true;
+  options.restrictions.queries.resize(scene.num_vertices);
+  options.restrictions.queries[7] = true;
   options.restrictions.frames.resize(scene.num_vertices);
   options.restrictions.frames[7] = options.restrictions.frames[8] = 5;
   RecordingVerifier verifier(ImageEdges(scene, ids));

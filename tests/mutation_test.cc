@@ -31,7 +31,7 @@
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/base/types.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/colmap_graphmatch.h"
 #include "tests/support/synthetic_database.h"
 
 #if defined(__SANITIZE_THREAD__)

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
-#include "colmap_graphmatch/pipeline/pair_list.h"
-#include "colmap_graphmatch/pipeline/run_state.h"
+#include "colmap_graphmatch/colmap_graphmatch.h"
+#include "colmap_graphmatch/files/pair_list.h"
+#include "colmap_graphmatch/vectors/checkpoint.h"
 #include "tests/support/synthetic_database.h"
 
 namespace colmap_graphmatch {
@@ -134,30 +134,34 @@ TEST(PipelineOptions, OptionsThatWouldHaveNoEffect) {
   }));
 }
 
-TEST(ImageVectorOptions, EveryFieldButThePathsChangesTheKey) {
-  std::set<std::string> keys = {ImageVectorOptions().Key()};
+TEST(ImageVectorOptions, TheSeedAndEveryFieldButThePathsChangeTheKey) {
+  std::set<std::string> keys = {ImageVectorOptions().Key(0), ImageVectorOptions().Key(1)};
+  EXPECT_EQ(keys.size(), 2U);
   const std::vector<void (*)(ImageVectorOptions*)> changes = {
       [](ImageVectorOptions* o) { o->descriptor = ImageVectorOptions::Descriptor::kVlad; },
       [](ImageVectorOptions* o) { o->pca_dim = 1; },
       [](ImageVectorOptions* o) { o->gmm.num_components = 1; },
       [](ImageVectorOptions* o) { o->num_training_descriptors = 1; },
-      [](ImageVectorOptions* o) { o->max_num_features = 1; },
-      [](ImageVectorOptions* o) { o->seed = 1; }};
+      [](ImageVectorOptions* o) { o->max_num_features = 1; }};
   for (const auto& change : changes) {
     ImageVectorOptions options;
     change(&options);
-    EXPECT_TRUE(keys.insert(options.Key()).second) << options.Key();
-    EXPECT_EQ(options.Key(), ImageVectorOptions(options).Key());
+    EXPECT_TRUE(keys.insert(options.Key(0)).second) << options.Key(0);
+    EXPECT_EQ(options.Key(0), ImageVectorOptions(options).Key(0));
   }
   ImageVectorOptions elsewhere;
   elsewhere.image_path = "photos";
   elsewhere.vectors_path = "vectors.npy";
-  EXPECT_EQ(elsewhere.Key(), ImageVectorOptions().Key());
+  EXPECT_EQ(elsewhere.Key(0), ImageVectorOptions().Key(0));
+  // State files have it in these words.
+  EXPECT_EQ(ImageVectorOptions().Key(7).rfind("descriptor 0, PCA 32, components 64, ", 0), 0U);
+  EXPECT_THAT(ImageVectorOptions().Key(7),
+              HasSubstr(", seed 7, training 100000, features 1000, seed 7"));
 }
 
-TEST(RunState, OneOfNothingKeepsNothing) {
-  RunState state;
-  state.Select(ImageVectorOptions(), {{1, 11}}, "");
+TEST(Checkpoint, OneOfNothingKeepsNothing) {
+  Checkpoint state;
+  state.Select(ImageVectorOptions(), 0, {{1, 11}}, "");
   state.KeepModel(VectorModel());
   const float entry = 1;
   state.KeepVectors({0}, 1, &entry);
@@ -169,15 +173,15 @@ TEST(RunState, OneOfNothingKeepsNothing) {
   EXPECT_TRUE(state.FindChanged().empty());
 }
 
-class RunStateTest : public ::testing::Test {
+class CheckpointTest : public ::testing::Test {
  protected:
-  RunState Open(double lock_timeout = 1) {
+  Checkpoint Open(double lock_timeout = 1) {
     const auto warn = [this](const std::string& text) { warnings_.push_back(text); };
-    RunState state(database_, {lock_timeout, &stop_}, warn, warn);
+    Checkpoint state(database_, {lock_timeout, &stop_}, {warn, warn});
     ImageVectorOptions options;
     options.gmm.num_components = 2;
     options.pca_dim = pca_dim_;
-    state.Select(options, {{1, 11}, {2, 22}, {3, 33}}, "");
+    state.Select(options, 0, {{1, 11}, {2, 22}, {3, 33}}, "");
     return state;
   }
 
@@ -194,7 +198,7 @@ class RunStateTest : public ::testing::Test {
   // What the next run finds of a mixture that was kept with two vectors of three.
   bool IsFound(const GaussianMixture& mixture) {
     {
-      RunState state = Open();
+      Checkpoint state = Open();
       state.KeepModel(Model(mixture));
       state.KeepVectors({0, 2}, 4, std::vector<float>(8, 1).data());
     }
@@ -208,14 +212,14 @@ class RunStateTest : public ::testing::Test {
   int pca_dim_ = 0;
 };
 
-TEST_F(RunStateTest, APcaIsKeptWithTheMixture) {
+TEST_F(CheckpointTest, APcaIsKeptWithTheMixture) {
   pca_dim_ = 3;
   VectorModel model = Model(Mixture(2, 3));
   EXPECT_FALSE(IsFound(model.mixture));  // Without the PCA it is of no use.
   model.pca.mean = Eigen::VectorXd::Constant(kDescriptorDim, 0.25);
   model.pca.basis = RowMatrixXd::Identity(3, kDescriptorDim);
   {
-    RunState state = Open();
+    Checkpoint state = Open();
     state.KeepModel(model);
     state.KeepVectors({0, 2}, 4, std::vector<float>(8, 1).data());
   }
@@ -228,11 +232,11 @@ TEST_F(RunStateTest, APcaIsKeptWithTheMixture) {
   EXPECT_FALSE(Open().ReadModel().has_value());
 }
 
-TEST_F(RunStateTest, AMixtureIsKeptWhileHalfOfTheImagesHaveAVector) {
+TEST_F(CheckpointTest, AMixtureIsKeptWhileHalfOfTheImagesHaveAVector) {
   const GaussianMixture mixture = Mixture(2, kDescriptorDim);
   EXPECT_TRUE(IsFound(mixture));
   {
-    RunState state = Open();
+    Checkpoint state = Open();
     EXPECT_EQ(state.ReadModel()->mixture.means, mixture.means);
     std::vector<float> vectors(12);
     EXPECT_THAT(state.ReadVectors(4, vectors.data()), ElementsAre(true, false, true));
@@ -243,7 +247,7 @@ TEST_F(RunStateTest, AMixtureIsKeptWhileHalfOfTheImagesHaveAVector) {
   EXPECT_THAT(warnings_, IsEmpty());
 }
 
-TEST_F(RunStateTest, WhatCannotBeAMixtureIsNotTakenForOne) {
+TEST_F(CheckpointTest, WhatCannotBeAMixtureIsNotTakenForOne) {
   EXPECT_TRUE(IsFound(Mixture(1, kDescriptorDim)));
   EXPECT_FALSE(IsFound(Mixture(3, kDescriptorDim)));
   EXPECT_FALSE(IsFound(Mixture(2, kDescriptorDim / 2)));
@@ -264,14 +268,14 @@ TEST_F(RunStateTest, WhatCannotBeAMixtureIsNotTakenForOne) {
   EXPECT_FALSE(Open().ReadModel().has_value());
 }
 
-TEST_F(RunStateTest, SeedsBelongToALoop) {
+TEST_F(CheckpointTest, SeedsBelongToALoop) {
   { Open().KeepSeeds("loop", {ImagePair(1, 2)}); }
   EXPECT_THAT(Open().ReadSeeds("loop"), ElementsAre(ImagePair(1, 2)));
   EXPECT_THAT(Open().ReadSeeds("another loop"), IsEmpty());
 }
 
-TEST_F(RunStateTest, WaitingEndsWhenAskedTo) {
-  const RunState first = Open();
+TEST_F(CheckpointTest, WaitingEndsWhenAskedTo) {
+  const Checkpoint first = Open();
   EXPECT_THROW(Open(0.3), DatabaseLockedError);
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("waiting for it")));
   std::thread stopper([this] {

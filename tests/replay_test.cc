@@ -4,15 +4,17 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/colmap_graphmatch.h"
 #include "colmap_graphmatch/encoding/numpy_file.h"
-#include "colmap_graphmatch/pipeline/finished_graph.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
-#include "colmap_graphmatch/pipeline/ranked_lists.h"
+#include "colmap_graphmatch/files/finished_graph.h"
+#include "colmap_graphmatch/files/ranked_lists.h"
 #include "colmap_graphmatch/report/exports.h"
 #include "colmap_graphmatch/report/json_report.h"
 #include "tests/support/synthetic_database.h"
@@ -191,6 +193,10 @@ class ReplayTest : public ::testing::Test {
     return RunPipeline(options_, stop, observer_);
   }
 
+  static double ModelledSeconds(const PipelineResult& result) {
+    return std::get<ReplayCost>(result.cost).modelled_seconds;
+  }
+
   TestDirectory directory_;
   PipelineOptions options_;
   Silence observer_;
@@ -201,7 +207,7 @@ TEST_F(ReplayTest, FindsTheEdgesAndLeavesTheDatabaseAlone) {
   const PipelineResult result = Run();
   EXPECT_EQ(result.matching.graph.NumEdges(), 60U);
   EXPECT_EQ(result.matching.num_components, 6U);
-  EXPECT_TRUE(result.replayed);
+  EXPECT_TRUE(std::holds_alternative<ReplayCost>(result.cost));
   EXPECT_TRUE(before == ReadFile(options_.database_path));
   // Nor does it touch what a run on these photos keeps for the next one.
   EXPECT_FALSE(std::filesystem::exists(options_.database_path.string() + ".graphmatch"));
@@ -242,15 +248,15 @@ TEST_F(ReplayTest, CostsAreThoseOfTheTestedPairs) {
   options_.strategy = PipelineOptions::Strategy::kExhaustive;
   // 435 pairs of 40 x 40 products, 60 of them verified.
   const double seconds = 435 * 40 * 40 * 3.3e-10 + 60 * 0.024;
-  EXPECT_NEAR(Run().modelled_seconds, seconds, 1e-9);
+  EXPECT_NEAR(ModelledSeconds(Run()), seconds, 1e-9);
   options_.num_threads = 2;
-  EXPECT_NEAR(Run().modelled_seconds, seconds / 2, 1e-9);
+  EXPECT_NEAR(ModelledSeconds(Run()), seconds / 2, 1e-9);
 }
 
 TEST_F(ReplayTest, TheLogHasEveryTest) {
-  options_.test_log_path = directory_.Path() / "log.csv";
+  options_.pair_log_path = directory_.Path() / "log.csv";
   const PipelineResult result = Run();
-  std::istringstream log(ReadFile(options_.test_log_path));
+  std::istringstream log(ReadFile(options_.pair_log_path));
   std::string line;
   std::getline(log, line);
   EXPECT_EQ(line, "test,seconds,stage,iteration,image1,image2,inliers,edge");
@@ -270,7 +276,7 @@ TEST_F(ReplayTest, TheLogHasEveryTest) {
   EXPECT_EQ(num_tests, result.matching.stages.All().num_tested);
   EXPECT_EQ(num_edges, 60U);
   EXPECT_TRUE(quoted);
-  options_.test_log_path = directory_.Path() / "none" / "log.csv";
+  options_.pair_log_path = directory_.Path() / "none" / "log.csv";
   EXPECT_THROW(Run(), FileError);
 }
 
@@ -346,7 +352,7 @@ TEST_F(ReplayTest, ABudgetEndsTheRun) {
   // The edges alone would take 1.44 s.
   const PipelineResult timed = Run();
   EXPECT_EQ(timed.stopped_by, PipelineResult::StoppedBy::kMaxMinutes);
-  EXPECT_LE(timed.modelled_seconds, 0.6);
+  EXPECT_LE(ModelledSeconds(timed), 0.6);
 }
 
 TEST_F(ReplayTest, AListIsCutAtItsEnd) {
@@ -359,36 +365,38 @@ TEST_F(ReplayTest, AListIsCutAtItsEnd) {
   options_.budget.max_pairs = 1;
   options_.keep_details = true;
   const PipelineResult result = Run();
-  ASSERT_THAT(result.tested, SizeIs(1));
-  EXPECT_EQ(result.tested[0].pair, ImagePair(9, 10));
+  ASSERT_TRUE(result.details.has_value());
+  ASSERT_THAT(result.details->tested, SizeIs(1));
+  EXPECT_EQ(result.details->tested[0].pair, ImagePair(9, 10));
 }
 
-TEST_F(ReplayTest, ADryRunFindsCandidatesAndTestsNothing) {
+TEST_F(ReplayTest, CandidatesAreFoundWithoutATest) {
+  const auto find = [this] { return FindCandidates(options_, StopRequest(), observer_); };
   options_.replay_path.clear();
-  options_.dry_run = true;
-  const PipelineResult result = Run();  // There is no COLMAP at options_.colmap_path.
-  EXPECT_EQ(result.matching.graph.NumTested(), 0U);
-  EXPECT_EQ(result.num_candidates_per_image, 10U);
-  ASSERT_GE(result.candidates.size(), 30U * 10 / 2);
+  const CandidateList list = find();  // There is no COLMAP at options_.colmap_path.
+  EXPECT_THAT(list.images, SizeIs(30));
+  EXPECT_EQ(list.num_per_image, 10U);
+  ASSERT_GE(list.pairs.size(), 30U * 10 / 2);
   EXPECT_TRUE(std::is_sorted(
-      result.candidates.begin(), result.candidates.end(),
+      list.pairs.begin(), list.pairs.end(),
       [](const CandidatePair& a, const CandidatePair& b) { return a.distance < b.distance; }));
-  EXPECT_EQ((result.candidates[0].pair.id1 - 1) / 5, (result.candidates[0].pair.id2 - 1) / 5);
+  EXPECT_EQ((list.pairs[0].pair.id1 - 1) / 5, (list.pairs[0].pair.id2 - 1) / 5);
   Database database(options_.database_path, sqlite::Access::kRead, 1);
   EXPECT_THAT(database.ReadTestedPairs(), IsEmpty());
 
   options_.strategy = PipelineOptions::Strategy::kRetrieval;
   options_.num_retrieved_images = 3;
-  EXPECT_EQ(Run().num_candidates_per_image, 3U);
+  EXPECT_EQ(find().num_per_image, 3U);
   options_.strategy = PipelineOptions::Strategy::kExhaustive;
-  EXPECT_THROW(Run(), OptionsError);
+  EXPECT_THROW(find(), OptionsError);
 }
 
 TEST_F(ReplayTest, ExportsForOtherPrograms) {
   options_.keep_details = true;
-  const PipelineResult result = Run();
+  const std::optional<RunDetails> details = Run().details;
+  ASSERT_TRUE(details.has_value());
   const std::filesystem::path path = directory_.Path() / "out.txt";
-  EXPECT_TRUE(WritePairList(path, result).any_spaces);  // All names have spaces.
+  EXPECT_TRUE(WritePairList(path, *details).any_spaces);  // All names have spaces.
   std::istringstream list(ReadFile(path));
   std::string line;
   std::size_t num_lines = 0;
@@ -401,9 +409,9 @@ TEST_F(ReplayTest, ExportsForOtherPrograms) {
   EXPECT_EQ(num_lines, 60U);
   EXPECT_EQ(num_tabs, 60U);
   // In the truth of this test, the later images have the more inliers.
-  EXPECT_EQ(first, result.images[28].name + "\t" + result.images[29].name);
+  EXPECT_EQ(first, details->images[28].name + "\t" + details->images[29].name);
 
-  PipelineResult plain = result;
+  RunDetails plain = *details;
   for (ImageRecord& image : plain.images) image.name = std::to_string(image.id) + ".jpg";
   const PairListNames plain_names = WritePairList(path, plain);
   EXPECT_FALSE(plain_names.any_spaces);
@@ -420,7 +428,7 @@ TEST_F(ReplayTest, ExportsForOtherPrograms) {
             std::count(whole.begin(), whole.end(), '\n'));
   EXPECT_THAT(rest, Not(HasSubstr("31 32")));
 
-  WriteGraph(directory_.Path() / "graph.graphml", result);
+  WriteGraph(directory_.Path() / "graph.graphml", *details);
   const std::string graphml = ReadFile(directory_.Path() / "graph.graphml");
   EXPECT_THAT(graphml, HasSubstr("with &quot;quotes&quot;, and a comma"));
   const auto count = [](const std::string& text, const std::string& part) {
@@ -430,12 +438,12 @@ TEST_F(ReplayTest, ExportsForOtherPrograms) {
   };
   EXPECT_EQ(count(graphml, "<node "), 30U);
   EXPECT_EQ(count(graphml, "<edge "), 60U);
-  WriteGraph(directory_.Path() / "graph.dot", result);
+  WriteGraph(directory_.Path() / "graph.dot", *details);
   const std::string dot = ReadFile(directory_.Path() / "graph.dot");
   EXPECT_THAT(dot, HasSubstr("label=\"with \\\"quotes\\\", and a comma\""));
   EXPECT_EQ(count(dot, "--"), 60U);
-  EXPECT_THROW(WriteGraph(directory_.Path() / "none" / "graph.dot", result), FileError);
-  EXPECT_THROW(WritePairList(directory_.Path() / "none" / "pairs.txt", result), FileError);
+  EXPECT_THROW(WriteGraph(directory_.Path() / "none" / "graph.dot", *details), FileError);
+  EXPECT_THROW(WritePairList(directory_.Path() / "none" / "pairs.txt", *details), FileError);
 }
 
 TEST_F(ReplayTest, RankedListsTakeThePlaceOfVectors) {

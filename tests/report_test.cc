@@ -87,30 +87,26 @@ TEST(HtmlReport, NeedsNothingElse) {
 PipelineResult MakeResult(ImageId num_images, std::size_t num_tested, std::size_t num_edges) {
   PipelineResult result;
   result.num_images = num_images;
+  RunDetails& details = result.details.emplace();
   for (ImageId id = 1; id <= num_images; ++id) {
-    result.images.push_back({id, std::to_string(id) + ".jpg", 100});
+    details.images.push_back({id, std::to_string(id) + ".jpg", 100});
   }
   for (ImageId a = 1; a <= num_images; ++a) {
     for (ImageId b = a + 1; b <= num_images; ++b) {
-      if (result.tested.size() == num_tested) return result;
-      const bool is_edge = result.tested.size() < num_edges;
-      result.tested.push_back({ImagePair(a, b), is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
-                               is_edge ? 20U : 0U});
+      if (details.tested.size() == num_tested) return result;
+      const bool is_edge = details.tested.size() < num_edges;
+      details.tested.push_back({ImagePair(a, b),
+                                is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge,
+                                is_edge ? 20U : 0U});
     }
   }
   return result;
 }
 
-PipelineOptions WithDetails() {
-  PipelineOptions options;
-  options.keep_details = true;
-  return options;
-}
-
 TEST(ReportData, AllPairsWithoutAnEdgeWhereThereAreFew) {
   PipelineResult result = MakeResult(4, 6, 2);
-  result.tested[4].outcome = PairOutcome::kFailed;
-  const ReportData data = MakeReportData(WithDetails(), result);
+  result.details->tested[4].outcome = PairOutcome::kFailed;
+  const ReportData data = MakeReportData(PipelineOptions(), result);
   ASSERT_TRUE(data.details.has_value());
   EXPECT_THAT(data.details->nonedges,
               ElementsAre(std::pair(0, 3), std::pair(1, 2), std::pair(2, 3)));
@@ -123,7 +119,7 @@ TEST(ReportData, AllPairsWithoutAnEdgeWhereThereAreFew) {
 TEST(ReportData, AnEvenSampleOfManyPairsWithoutAnEdge) {
   constexpr std::size_t kNumNonedges = 3 * kMaxNonedges + 7;
   const PipelineResult result = MakeResult(2000, kNumNonedges + 50, 50);
-  const ReportData data = MakeReportData(WithDetails(), result);
+  const ReportData data = MakeReportData(PipelineOptions(), result);
   ASSERT_TRUE(data.details.has_value());
   const auto& nonedges = data.details->nonedges;
   ASSERT_EQ(nonedges.size(), kMaxNonedges);
@@ -132,7 +128,8 @@ TEST(ReportData, AnEvenSampleOfManyPairsWithoutAnEdge) {
   // Every image has a third of its pairs.
   std::vector<std::size_t> all(2000, 0);
   std::vector<std::size_t> sampled(2000, 0);
-  for (std::size_t i = 50; i < result.tested.size(); ++i) ++all[result.tested[i].pair.id1 - 1];
+  for (std::size_t i = 50; i < result.details->tested.size(); ++i)
+    ++all[result.details->tested[i].pair.id1 - 1];
   for (const auto& [a, b] : nonedges) ++sampled[a];
   for (std::size_t image = 0; image < 2000; ++image) {
     EXPECT_NEAR(static_cast<double>(sampled[image]), static_cast<double>(all[image]) / 3, 1.5);
@@ -142,11 +139,13 @@ TEST(ReportData, AnEvenSampleOfManyPairsWithoutAnEdge) {
   const Json report = Json::parse(MakeJsonReport(data));
   EXPECT_EQ(report["nonedge_list"].size(), 2 * kMaxNonedges);
   EXPECT_EQ(report["nonedges_left_out"], kNumNonedges - kMaxNonedges);
-  EXPECT_EQ(MakeReportData(WithDetails(), result).details->nonedges, nonedges);
+  EXPECT_EQ(MakeReportData(PipelineOptions(), result).details->nonedges, nonedges);
 }
 
 TEST(ReportData, WithoutDetailsSumsAlone) {
-  const ReportData data = MakeReportData(PipelineOptions(), MakeResult(4, 6, 2));
+  PipelineResult result = MakeResult(4, 6, 2);
+  result.details.reset();
+  const ReportData data = MakeReportData(PipelineOptions(), result);
   EXPECT_FALSE(data.details.has_value());
   const Json report = Json::parse(MakeJsonReport(data));
   EXPECT_FALSE(report.contains("edge_list"));
@@ -157,13 +156,12 @@ TEST(ReportData, NamesTheStrategyAndTheDescriptor) {
   PipelineOptions options;
   options.strategy = PipelineOptions::Strategy::kBriad;
   options.ranking.vectors.descriptor = ImageVectorOptions::Descriptor::kVlad;
-  PipelineResult result = MakeResult(4, 6, 2);
+  const PipelineResult result = MakeResult(4, 6, 2);
   EXPECT_EQ(MakeReportData(options, result).strategy, "briad");
   EXPECT_EQ(MakeReportData(options, result).descriptor, "vlad");
   options.ranking.ranking_path = "lists.tsv";
   EXPECT_EQ(MakeReportData(options, result).descriptor, "lists");
   options.match_list_path = "pairs.txt";
-  result.listed = true;
   EXPECT_EQ(MakeReportData(options, result).strategy, "list");
   EXPECT_EQ(MakeReportData(options, result).descriptor, std::nullopt);
 }

@@ -51,7 +51,6 @@ class VerifierTest : public ::testing::Test {
     Set("FAKE_COLMAP_LOG", (directory_.Path() / "log.txt").string());
     database_path_ = directory_.Path() / "data base.db";
     WriteSyntheticDatabase(database_path_, Schema::kColmap38, MakePlaces(5, 5, 30, 1));
-    options_.num_threads = 2;
     // These images match as the test double says, not as their descriptors do.
     options_.matcher = VerificationOptions::Matcher::kColmap;
     options_.lock_timeout = 5;
@@ -68,8 +67,9 @@ class VerifierTest : public ::testing::Test {
     const ColmapInstallation colmap = DetectColmap(FAKE_COLMAP_PATH, work.Path(), stop_);
     const std::vector<ImageRecord> images = database.ReadImages();
     const auto warn = [this](const std::string& warning) { warnings_.push_back(warning); };
-    const VerificationPlan plan = PlanVerification(options_, colmap);
-    ColmapVerifier geometry(options_, colmap, database_path_, images, work.Path(), stop_, warn);
+    const VerificationPlan plan = PlanVerification(options_, num_threads_, colmap);
+    ColmapVerifier geometry(options_, plan, colmap, database_path_, images, work.Path(), stop_,
+                            warn);
     BatchVerifier verifier(options_, plan, geometry, database, images, stop_, warn);
     const bool complete = verifier.Verify(pairs, [this](const VerifiedPair& pair) {
       EXPECT_TRUE(outcomes_.emplace(pair.pair, pair.outcome).second);
@@ -111,6 +111,7 @@ class VerifierTest : public ::testing::Test {
   TestDirectory directory_;
   std::filesystem::path database_path_;
   VerificationOptions options_;
+  int num_threads_ = 2;
   StopRequest stop_;
   std::map<ImagePair, PairOutcome> outcomes_;
   MatchingStatistics statistics_;
@@ -365,7 +366,7 @@ TEST_F(ExactMatcherTest, TheResultDependsOnNeitherTheCacheNorTheThreads) {
   const std::string expected = Dump();
   for (const int num_threads : {1, 3, 16}) {
     Clear();
-    options_.num_threads = num_threads;
+    num_threads_ = num_threads;
     options_.exact.cache_gb = 1e-9;  // One byte: nothing is kept.
     EXPECT_TRUE(Verify(AllPairs(25)));
     EXPECT_EQ(Dump(), expected) << num_threads << " threads";
@@ -404,9 +405,10 @@ TEST_F(ExactMatcherTest, FeaturesThatChangeMeanwhileAreAnError) {
   const WorkDirectory work(directory_.Path());
   const ColmapInstallation colmap = DetectColmap(FAKE_COLMAP_PATH, work.Path(), stop_);
   const auto ignore = [](const std::string&) {};
-  ColmapVerifier geometry(options_, colmap, database_path_, images, work.Path(), stop_, ignore);
-  BatchVerifier verifier(options_, PlanVerification(options_, colmap), geometry, database, images,
-                         stop_, ignore);
+  const VerificationPlan plan = PlanVerification(options_, num_threads_, colmap);
+  ColmapVerifier geometry(options_, plan, colmap, database_path_, images, work.Path(), stop_,
+                          ignore);
+  BatchVerifier verifier(options_, plan, geometry, database, images, stop_, ignore);
   sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
       .Execute("DELETE FROM descriptors WHERE image_id = 3");
   try {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <tuple>
 
 namespace colmap_graphmatch {
@@ -16,8 +18,19 @@ using PairId = std::uint64_t;
 // COLMAP's Database::kMaxNumImages (src/colmap/scene/database.h), the base of the pair_id codec.
 inline constexpr PairId kMaxNumImages = 2147483647;
 
+// The number of an image among those that a run works on, 0 .. N - 1: in rankings and in the
+// matching graph.
+using Vertex = std::uint32_t;
+
 // The length of a SIFT descriptor.
 inline constexpr int kDescriptorDim = 128;
+
+// An image of a COLMAP database.
+struct ImageRecord {
+  ImageId id = 0;
+  std::string name;
+  std::size_t num_features = 0;  // 0 also for an image whose features were never extracted.
+};
 
 // An unordered pair of two different images, kept with the smaller id first, as COLMAP stores it.
 struct ImagePair {

@@ -12,6 +12,7 @@
 #include <memory>
 #include <new>
 #include <string>
+#include <variant>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/output_file.h"
@@ -23,7 +24,7 @@
 #include "colmap_graphmatch/cli/options.h"
 #include "colmap_graphmatch/cli/run_files.h"
 #include "colmap_graphmatch/cli/summary.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/colmap_graphmatch.h"
 #include "colmap_graphmatch/report/exports.h"
 #include "colmap_graphmatch/report/html_report.h"
 #include "colmap_graphmatch/report/json_report.h"
@@ -131,25 +132,54 @@ void WriteReport(const CommandLine& line, const PipelineResult& result, Console&
                  [&](std::ostream& file) { file << MakeHtmlReport(json, photos); });
 }
 
+void WarnOfNames(const CommandLine& line, const PairListNames& names, Console& console) {
+  if (names.any_spaces) {
+    console.OnWarning("Some names of images have spaces: lines of " + line.pair_list_path.string() +
+                      " with such a name have a tab between the names, and COLMAP and hloc cannot "
+                      "read them; --GraphMatching.match_list_path can.");
+  }
+  if (names.num_left_out > 0) {
+    console.OnWarning(std::to_string(names.num_left_out) + " pairs are not in " +
+                      line.pair_list_path.string() +
+                      ": the names of their images have line ends or tabs, which no list can "
+                      "hold.");
+  }
+}
+
 // The files that were asked for.
 void WriteFiles(const CommandLine& line, const PipelineResult& result, Console& console) {
   if (!line.report_path.empty()) WriteReport(line, result, console);
+  if (!result.details) return;
   if (!line.pair_list_path.empty()) {
-    const PairListNames names = WritePairList(line.pair_list_path, result);
-    if (names.any_spaces) {
-      console.OnWarning(
-          "Some names of images have spaces: lines of " + line.pair_list_path.string() +
-          " with such a name have a tab between the names, and COLMAP and hloc cannot "
-          "read them; --GraphMatching.match_list_path can.");
-    }
-    if (names.num_left_out > 0) {
-      console.OnWarning(std::to_string(names.num_left_out) + " pairs are not in " +
-                        line.pair_list_path.string() +
-                        ": the names of their images have line ends or tabs, which no list can "
-                        "hold.");
-    }
+    WarnOfNames(line, WritePairList(line.pair_list_path, *result.details), console);
   }
-  if (!line.graph_path.empty()) WriteGraph(line.graph_path, result);
+  if (!line.graph_path.empty()) WriteGraph(line.graph_path, *result.details);
+}
+
+void PrintSummary(const CommandLine& line, const std::string& summary, Console& console) {
+  console.EndProgress();
+  if (line.log.quiet) return;
+  std::cout << summary << std::flush;
+  WarnIfNotWritten(std::cout, console);
+}
+
+void ShowCandidates(const CommandLine& line, Console& console) {
+  const CandidateList candidates = FindCandidates(line.pipeline, stop_request, console);
+  PrintSummary(line, FormatSummary(candidates), console);
+  if (line.pair_list_path.empty()) return;
+  WarnOfNames(line, WritePairList(line.pair_list_path, candidates), console);
+}
+
+// Whether COLMAP failed on every pair that it was given; then it has been said.
+bool HasColmapFailed(const PipelineResult& result, Console& console) {
+  const auto* cost = std::get_if<VerificationCost>(&result.cost);
+  if (cost == nullptr || cost->num_failed == 0 || cost->num_verified > 0 ||
+      result.stopped_by == PipelineResult::StoppedBy::kRequest) {
+    return false;
+  }
+  console.Error("COLMAP failed on all " + std::to_string(cost->num_failed) +
+                " pairs that it was given; the warnings above say how. They stay untested.");
+  return true;
 }
 
 int Run(const CommandLine& line, Console& console) {
@@ -158,20 +188,14 @@ int Run(const CommandLine& line, Console& console) {
   for (const std::string& warning : line.warnings) console.OnWarning(warning);
   try {
     CheckOutputs(FilesOfRun(line));
+    if (line.dry_run) {
+      ShowCandidates(line, console);
+      return kExitSuccess;
+    }
     const PipelineResult result = RunPipeline(line.pipeline, stop_request, console);
-    console.EndProgress();
-    if (!line.log.quiet) {
-      std::cout << FormatSummary(line.pipeline, result) << std::flush;
-      WarnIfNotWritten(std::cout, console);
-    }
+    PrintSummary(line, FormatSummary(line.pipeline, result), console);
     WriteFiles(line, result, console);
-    const std::size_t num_failed = result.descriptor_matching.num_failed;
-    if (num_failed > 0 && result.colmap.num_verified == 0 &&
-        result.stopped_by != PipelineResult::StoppedBy::kRequest) {
-      console.Error("COLMAP failed on all " + std::to_string(num_failed) +
-                    " pairs that it was given; the warnings above say how. They stay untested.");
-      return kExitColmap;
-    }
+    if (HasColmapFailed(result, console)) return kExitColmap;
     if (result.matching.finished) return kExitSuccess;
     if (result.stopped_by != PipelineResult::StoppedBy::kRequest) {
       console.OnInfo(

@@ -194,7 +194,7 @@ void Table::AddGraph() {
   Add("GraphMatching.max_minutes", DoubleOf(&p.budget.max_minutes, Zero::kAllowed),
       "minutes (>= 0) after which no pair is tested any more, counted from the start; ranking the "
       "images is not cut short; 0: no limit");
-  Add("GraphMatching.dry_run", BoolOf(&p.dry_run),
+  Add("GraphMatching.dry_run", BoolOf(&line_->dry_run),
       "only rank the images: the first candidates are counted, and written by export_pairs; "
       "nothing "
       "is verified, nothing written to the database, and COLMAP is not run");
@@ -278,7 +278,7 @@ void Table::AddEvaluation() {
       "read it; in a dry run the candidates, nearest first");
   Add("GraphMatching.export_graph", TextOf(&line_->graph_path, "the path of a file"),
       "write the matching graph as GraphML, or for Graphviz (.dot)");
-  Add("GraphMatching.test_log", TextOf(&p.test_log_path, "the path of a file"),
+  Add("GraphMatching.test_log", TextOf(&p.pair_log_path, "the path of a file"),
       "a CSV file to write with every pair that is tested");
   Add("GraphMatching.replay_path",
       TextOf(&p.replay_path, "the path of a matched COLMAP database or a list of edges"),

@@ -127,7 +127,6 @@ class Parser {
       p.verification.colmap_options["default_random_seed"] =
           std::to_string(p.seed % (std::uint64_t{1} << 31U));
     }
-    p.verification.num_threads = p.num_threads;
     LogOptions& log = line_->log;
     if (!line_->log_to_stderr && !log.path.empty()) log.target = LogOptions::Target::kFile;
     if (log.target == LogOptions::Target::kFile && log.path.empty()) {
@@ -135,13 +134,20 @@ class Parser {
     }
     CheckFiles();
     p.Check();
+    if (line_->dry_run && (!p.RanksImages() || !p.replay_path.empty())) {
+      throw OptionsError(
+          "--GraphMatching.dry_run shows which pairs a strategy that ranks images would test "
+          "first; with a list of pairs, the strategy exhaustive or --GraphMatching.replay_path "
+          "there is nothing to show.");
+    }
   }
 
  private:
   void CheckFiles() {
     PipelineOptions& p = line_->pipeline;
     const auto& graph = line_->graph_path;
-    if (p.dry_run && (!line_->report_path.empty() || !graph.empty() || !p.test_log_path.empty())) {
+    if (line_->dry_run &&
+        (!line_->report_path.empty() || !graph.empty() || !p.pair_log_path.empty())) {
       throw OptionsError(
           "With --GraphMatching.dry_run nothing is tested: there is nothing for "
           "--GraphMatching.report, --GraphMatching.export_graph or --GraphMatching.test_log to "

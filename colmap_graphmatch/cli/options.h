@@ -7,12 +7,13 @@
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/cli/log_options.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/options.h"
 
 namespace colmap_graphmatch {
 
 struct CommandLine {
   PipelineOptions pipeline;
+  bool dry_run = false;  // Only the candidates are wanted.
   bool help = false;
   bool version = false;
   std::filesystem::path project_path;

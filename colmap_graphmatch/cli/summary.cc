@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <variant>
+
 #include "colmap_graphmatch/cli/progress.h"
-#include "colmap_graphmatch/report/report_data.h"
+#include "colmap_graphmatch/vectors/image_ranker.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -26,42 +28,35 @@ std::string FormatStage(const char* name, const StageStatistics& stage) {
 }
 
 // Where the time of matching went.
-std::string FormatVerification(const PipelineResult& result) {
-  const MatchingStatistics& matching = result.descriptor_matching;
-  const ColmapVerifier::Statistics& colmap = result.colmap;
+std::string FormatCost(const VerificationCost& cost) {
   std::string text;
-  if (matching.num_matched > 0) {
+  if (cost.num_matched > 0) {
     text += fmt::format(
         "Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
-        matching.num_matched, FormatDuration(matching.seconds),
-        static_cast<double>(matching.num_image_reads) / static_cast<double>(matching.num_matched));
+        cost.num_matched, FormatDuration(cost.matching_seconds),
+        static_cast<double>(cost.num_image_reads) / static_cast<double>(cost.num_matched));
   }
-  const double both = matching.seconds + colmap.seconds;
+  const double both = cost.matching_seconds + cost.colmap_seconds;
   if (both > 0) {
     text += fmt::format(
         "COLMAP             {} pairs in {}, summed over its processes: {:.0f} % of {}\n",
-        colmap.num_verified, FormatDuration(colmap.seconds), 100 * colmap.seconds / both,
+        cost.num_verified, FormatDuration(cost.colmap_seconds), 100 * cost.colmap_seconds / both,
         "matching and verification");
   }
   return text;
 }
 
-std::string FormatImages(const PipelineResult& result) {
-  std::string text = fmt::format("\nImages             {}", result.num_images);
-  if (result.num_images_without_features > 0) {
-    text += fmt::format(" ({} without features)", result.num_images_without_features);
-  }
-  return text + "\n";
+std::string FormatCost(const ReplayCost& cost) {
+  return fmt::format("Replayed           matching and verification would have taken some {}\n",
+                     FormatDuration(cost.modelled_seconds));
 }
 
-std::string FormatDryRun(const PipelineResult& result) {
-  std::string text = FormatImages(result);
-  text += fmt::format(
-      "Candidates         {} pairs that are not tested yet: each image with its {}\n",
-      result.candidates.size(), fmt::format("{} nearest", result.num_candidates_per_image));
-  text += "Dry run            nothing was tested, and nothing written to the database\n";
-  text += fmt::format("Time               {}\n", FormatDuration(result.total_seconds));
-  return text;
+std::string FormatImages(std::size_t num_images, std::size_t num_without_features) {
+  std::string text = fmt::format("\nImages             {}", num_images);
+  if (num_without_features > 0) {
+    text += fmt::format(" ({} without features)", num_without_features);
+  }
+  return text + "\n";
 }
 
 std::string FormatStoppedBy(const PipelineOptions& options, const PipelineResult& result) {
@@ -86,7 +81,7 @@ std::string FormatStoppedBy(const PipelineOptions& options, const PipelineResult
   return fmt::format("Stopped            {}; {}\n", limit, left);
 }
 
-std::string FormatTests(const PipelineResult& result) {
+std::string FormatTests(const PipelineOptions& options, const PipelineResult& result) {
   const ExplorationResult& matching = result.matching;
   const StageStatistics all = matching.stages.All();
   const auto num_images =
@@ -95,8 +90,9 @@ std::string FormatTests(const PipelineResult& result) {
   std::string text = fmt::format("Pairs tested       {} of {:.0f} possible ({:.2f} %)\n",
                                  all.num_tested, num_possible, Share(all.num_tested, num_possible));
   if (matching.num_seed_pairs > 0) {
-    text += fmt::format("Already there      {} pairs{}, {} edges\n", matching.num_seed_pairs,
-                        result.listed ? " that are not listed" : "", matching.num_seed_edges);
+    text +=
+        fmt::format("Already there      {} pairs{}, {} edges\n", matching.num_seed_pairs,
+                    options.RanksImages() ? "" : " that are not listed", matching.num_seed_edges);
   }
   for (const LoopStage stage : kLoopStages) {
     const StageStatistics& statistics = matching.stages[stage];
@@ -116,7 +112,7 @@ std::string FormatTests(const PipelineResult& result) {
 
 std::string FormatTime(const PipelineOptions& options, const PipelineResult& result) {
   std::string text = fmt::format("Time               {}", FormatDuration(result.total_seconds));
-  if (result.listed) return text + "\n";
+  if (!options.RanksImages()) return text + "\n";
   const ImageRankingSeconds& seconds = result.preprocessing_seconds;
   text += " (";
   if (seconds.mixture > 0) text += fmt::format("mixture {}, ", FormatDuration(seconds.mixture));
@@ -131,9 +127,9 @@ std::string FormatTime(const PipelineOptions& options, const PipelineResult& res
 }  // namespace
 
 std::string FormatSummary(const PipelineOptions& options, const PipelineResult& result) {
-  if (result.dry_run) return FormatDryRun(result);
   const ExplorationResult& matching = result.matching;
-  std::string text = FormatImages(result) + FormatTests(result);
+  std::string text = FormatImages(result.num_images, result.num_images_without_features) +
+                     FormatTests(options, result);
   text +=
       fmt::format("Matching graph     {} edges, {} components, the largest of {} images\n",
                   matching.graph.NumEdges(), matching.num_components, matching.largest_component);
@@ -144,12 +140,18 @@ std::string FormatSummary(const PipelineOptions& options, const PipelineResult& 
     text += fmt::format("Failed             {} pairs, see the warnings; they stay untested\n",
                         matching.failed_pairs.size());
   }
-  text += FormatVerification(result);
-  if (result.replayed) {
-    text += fmt::format("Replayed           matching and verification would have taken some {}\n",
-                        FormatDuration(result.modelled_seconds));
-  }
+  text += std::visit([](const auto& cost) { return FormatCost(cost); }, result.cost);
   return text + FormatTime(options, result);
+}
+
+std::string FormatSummary(const CandidateList& candidates) {
+  std::string text = FormatImages(candidates.images.size(), candidates.num_images_without_features);
+  text += fmt::format(
+      "Candidates         {} pairs that are not tested yet: each image with its {} nearest\n",
+      candidates.pairs.size(), candidates.num_per_image);
+  text += "Dry run            nothing was tested, and nothing written to the database\n";
+  text += fmt::format("Time               {}\n", FormatDuration(candidates.total_seconds));
+  return text;
 }
 
 }  // namespace colmap_graphmatch

@@ -16,12 +16,6 @@
 
 namespace colmap_graphmatch {
 
-struct ImageRecord {
-  ImageId id = 0;
-  std::string name;
-  std::size_t num_features = 0;  // 0 also for an image whose features were never extracted.
-};
-
 // Those of the images that have features.
 std::vector<ImageRecord> WithFeatures(const std::vector<ImageRecord>& images);
 

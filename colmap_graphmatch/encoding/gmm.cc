@@ -115,8 +115,8 @@ std::vector<Eigen::Index> ChooseCenters(const RowMatrixXf& samples, int num_cent
   return centers;
 }
 
-GaussianMixture InitialMixture(const GmmOptions& options, const RowMatrixXf& samples,
-                               ThreadPool& threads) {
+GaussianMixture InitialMixture(const GmmOptions& options, std::uint64_t seed,
+                               const RowMatrixXf& samples, ThreadPool& threads) {
   std::vector<Eigen::RowVectorXd> sums(NumChunks(samples.rows()));
   ForEachChunk(samples.rows(), threads,
                [&](std::size_t chunk, Eigen::Index first, Eigen::Index count) {
@@ -140,7 +140,7 @@ GaussianMixture InitialMixture(const GmmOptions& options, const RowMatrixXf& sam
   variance = (variance / static_cast<double>(samples.rows())).cwiseMax(options.variance_floor);
 
   const std::vector<Eigen::Index> centers =
-      ChooseCenters(samples, options.num_components, options.seed, threads);
+      ChooseCenters(samples, options.num_components, seed, threads);
   const auto num_components = static_cast<Eigen::Index>(centers.size());
   GaussianMixture mixture;
   mixture.weights =
@@ -206,12 +206,12 @@ void GmmOptions::Check() const {
   if (!(variance_floor > 0)) throw OptionsError("The smallest variance must be positive.");
 }
 
-std::string GmmOptions::Key() const {
+std::string GmmOptions::Key(std::uint64_t seed) const {
   // Does not compile if a field is forgotten.
-  const auto& [components, least_growth, iterations, floor, own_seed] = *this;
+  const auto& [components, least_growth, iterations, floor] = *this;
   return "components " + std::to_string(components) + ", tolerance " + Hex(least_growth) +
          ", iterations " + std::to_string(iterations) + ", variance floor " + Hex(floor) +
-         ", seed " + std::to_string(own_seed);
+         ", seed " + std::to_string(seed);
 }
 
 SufficientStatistics::SufficientStatistics(Eigen::Index num_components, Eigen::Index dim)
@@ -293,13 +293,13 @@ RowMatrixXf GmmEvaluator::Responsibilities(const Eigen::Ref<const RowMatrixXf>& 
   return responsibilities.leftCols(constants_.size());
 }
 
-GmmTraining TrainGmm(const GmmOptions& options, const RowMatrixXf& samples, ThreadPool& threads,
-                     const StopRequest* stop) {
+GmmTraining TrainGmm(const GmmOptions& options, std::uint64_t seed, const RowMatrixXf& samples,
+                     ThreadPool& threads, const StopRequest* stop) {
   options.Check();
   if (samples.rows() == 0) throw OptionsError("A Gaussian mixture needs at least one sample.");
 
   GmmTraining training;
-  training.mixture = InitialMixture(options, samples, threads);
+  training.mixture = InitialMixture(options, seed, samples, threads);
   GaussianMixture& mixture = training.mixture;
   double previous = -INFINITY;
   for (int iteration = 0; iteration < options.max_num_iterations; ++iteration) {

@@ -2,11 +2,11 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/encoding/gmm_options.h"
 #include "colmap_graphmatch/encoding/matrix.h"
 
 namespace colmap_graphmatch {
@@ -21,30 +21,6 @@ struct GaussianMixture {
   Eigen::Index Dim() const { return means.cols(); }
 };
 
-struct GmmOptions {
-  // K. More components describe finer differences and cost proportionally more time and memory: the
-  // Fisher vector of an image has 2 K D entries. Paper: 16 ("We used 16 centroids") of D = 128.
-  int num_components = 64;
-
-  // EM stops when the log-likelihood grows by less than this fraction of itself, or after
-  // max_num_iterations.
-  double tolerance = 1e-5;
-  int max_num_iterations = 100;
-
-  // Smallest variance of a component in any dimension, in units of the samples squared (descriptors
-  // have unit length).
-  double variance_floor = 1e-4;
-
-  // Of the k-means++ start.
-  std::uint64_t seed = 0;
-
-  // Names the values of all fields: equal for equal options alone.
-  std::string Key() const;
-
-  // Throws OptionsError.
-  void Check() const;
-};
-
 struct GmmTraining {
   GaussianMixture mixture;
   // Mean log-likelihood of a sample before each update; it never falls, except after an empty
@@ -57,10 +33,10 @@ struct GmmTraining {
 // Fits a mixture to samples (N x D, one a row, N >= 1, finite) by expectation maximisation from a
 // k-means++ start (Arthur and Vassilvitskii, SODA 2007). A component that no sample belongs to any
 // more is placed beside the widest one. With fewer than K different samples found by the start, the
-// mixture has fewer components. The result is bitwise the same for any number of threads. Throws
-// OptionsError; StoppedError if stop (may be null) asks for it.
-GmmTraining TrainGmm(const GmmOptions& options, const RowMatrixXf& samples, ThreadPool& threads,
-                     const StopRequest* stop = nullptr);
+// mixture has fewer components. seed: of the start. The result is bitwise the same for any number
+// of threads. Throws OptionsError; StoppedError if stop (may be null) asks for it.
+GmmTraining TrainGmm(const GmmOptions& options, std::uint64_t seed, const RowMatrixXf& samples,
+                     ThreadPool& threads, const StopRequest* stop = nullptr);
 
 // Sums over samples x_i with responsibilities q_ik, the common ground of EM and of the Fisher
 // vector.

@@ -7,10 +7,11 @@
 #include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
-#include "colmap_graphmatch/graph/pair_proposer.h"
 #include "colmap_graphmatch/graph/stages.h"
 
 namespace colmap_graphmatch {
+
+class PairProposer;
 
 // Where a run is after a pair was verified.
 struct LoopProgress {

@@ -6,6 +6,7 @@
 #include "colmap_graphmatch/graph/components.h"
 #include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/pair_proposer.h"
 
 namespace colmap_graphmatch {
 

@@ -43,7 +43,7 @@ std::optional<Proposal> GraphMatchProposer::Next(const MatchingGraph& graph) {
 
 std::vector<VertexPair> GraphMatchProposer::Sample(const MatchingGraph& graph) {
   std::vector<VertexPair> pairs = sampler_.Propose(iteration_, graph);
-  sampler_.Charge();
+  sampler_.Spend();
   remaining_.OnSampling(iteration_, pairs.size(), sampler_.NumDrawn());
   return pairs;
 }

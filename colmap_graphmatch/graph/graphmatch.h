@@ -25,7 +25,7 @@ class GraphMatchProposer : public PairProposer {
 
   std::optional<Proposal> Next(const MatchingGraph& graph) override;
   void OnTested(const StageStatistics& batch) override;
-  void OnKnown(const MatchingGraph& graph) override { sampler_.ChargeTested(graph); }
+  void OnKnown(const MatchingGraph& graph) override { sampler_.SpendOnTested(graph); }
   ExpectedTests TestsAfter(const Proposal& proposal, const MatchingGraph& graph) const override;
 
  private:

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "colmap_graphmatch/ranking/ranking.h"
+#include "colmap_graphmatch/base/types.h"
 
 namespace colmap_graphmatch {
 

@@ -29,7 +29,7 @@ struct GraphMatchOptions {
   // 1.2 % of the edges where it was tried (docs/evaluation.md).
   int max_failed_samples = 0;
 
-  // Images that do not seek neither draw tests nor are propagated from.
+  // Images that are no queries neither draw tests nor are propagated from.
   PairRestrictions restrictions;
 
   // The number of tests that the formula or max_tests_for_sampling gives for N images.

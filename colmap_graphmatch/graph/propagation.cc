@@ -29,7 +29,7 @@ class SourceCandidates {
 
   // What (a, b) proposes, for every neighbour b of a: pairs of a with neighbours of b.
   void Propagate(Vertex a, std::vector<VertexPair>* pairs) {
-    if (!options_.restrictions.Seeks(a)) return;
+    if (!options_.restrictions.IsQuery(a)) return;
     if (graph_.Degree(a) >= static_cast<std::size_t>(options_.max_num_neighbors)) return;
     for (const Vertex b : graph_.Neighbors(a)) {
       candidates_.clear();
@@ -92,7 +92,7 @@ std::vector<VertexPair> Propagate(const GraphMatchOptions& options, const Rankin
 std::size_t CountOpenPairs(const GraphMatchOptions& options, const MatchingGraph& graph,
                            ThreadPool& threads) {
   const auto looks_for_more = [&](Vertex a) {
-    return options.restrictions.Seeks(a) &&
+    return options.restrictions.IsQuery(a) &&
            graph.Degree(a) < static_cast<std::size_t>(options.max_num_neighbors);
   };
   const std::size_t num_vertices = graph.NumVertices();

@@ -9,7 +9,7 @@
 namespace colmap_graphmatch {
 namespace {
 
-// Calls propose(vertex, &partners) for every vertex that seeks, in parallel, and unites what it
+// Calls propose(vertex, &partners) for every query image, in parallel, and unites what it
 // proposes: ascending, each pair once, without pairs of one frame.
 template <typename Propose>
 std::vector<VertexPair> Unite(std::size_t num_vertices, const PairRestrictions& restrictions,
@@ -17,7 +17,7 @@ std::vector<VertexPair> Unite(std::size_t num_vertices, const PairRestrictions& 
   std::vector<std::vector<VertexPair>> proposals(num_vertices);
   threads.ParallelFor(num_vertices, [&](std::size_t i) {
     const auto vertex = static_cast<Vertex>(i);
-    if (!restrictions.Seeks(vertex)) return;
+    if (!restrictions.IsQuery(vertex)) return;
     std::vector<Vertex> partners;
     propose(vertex, &partners);
     std::sort(partners.begin(), partners.end());

@@ -19,7 +19,7 @@ struct RetrievalOptions {
   // Rounds of query expansion after that. At least 0. BRIAD runs 4.
   int num_expansions = 0;
 
-  // Images that do not seek retrieve nothing and are not expanded.
+  // Images that are no queries retrieve nothing and are not expanded.
   PairRestrictions restrictions;
 
   // Throws OptionsError.

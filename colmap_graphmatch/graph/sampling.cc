@@ -57,7 +57,7 @@ std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& gra
     const bool gives_up = GivesUp(vertex, graph);
     drawn_[i].clear();
     const int num = std::min(tests, budget - num_drawn_[i]);
-    if (num <= 0 || gives_up || !options_.restrictions.Seeks(vertex) ||
+    if (num <= 0 || gives_up || !options_.restrictions.IsQuery(vertex) ||
         graph.Degree(vertex) >= static_cast<std::size_t>(options_.max_num_neighbors)) {
       return;
     }
@@ -78,7 +78,7 @@ std::size_t Sampler::NumDrawn() const {
   return num_drawn;
 }
 
-void Sampler::ChargeTested(const MatchingGraph& graph) {
+void Sampler::SpendOnTested(const MatchingGraph& graph) {
   const std::size_t num_vertices = ranking_.NumVertices();
   const int budget = options_.MaxTestsForSampling(num_vertices);
   // What the iterations leave of the budget.
@@ -100,7 +100,7 @@ void Sampler::ChargeTested(const MatchingGraph& graph) {
   });
 }
 
-void Sampler::Charge() {
+void Sampler::Spend() {
   for (std::size_t i = 0; i < drawn_.size(); ++i) {
     num_drawn_[i] += static_cast<int>(drawn_[i].size());
   }

@@ -24,15 +24,15 @@ class Sampler {
   // other.
   std::size_t NumDrawn() const;
 
-  // Charges the proposed pairs to the budgets of the vertices that drew them. To be called once for
-  // every proposal that is tested, before the next one is made.
-  void Charge();
+  // Spends the budgets of the vertices that drew the proposed pairs. To be called once for every
+  // proposal that is tested, before the next one is made.
+  void Spend();
 
-  // Charges the budget of every vertex with the tested pairs among the first MaxTestsForSampling of
+  // Spends the budget of every vertex on the tested pairs among the first MaxTestsForSampling of
   // its ranked list: whoever tested them did what sampling would have done. Vertices without any
   // tested pair do not count in the list: images that were added since are not the task of those
   // that have been sampled.
-  void ChargeTested(const MatchingGraph& graph);
+  void SpendOnTested(const MatchingGraph& graph);
 
  private:
   // Counts how many draws of the vertex in a row were no edges, with the last proposal; true if it

@@ -18,10 +18,6 @@ constexpr std::size_t kMaxChunk = 65536;
 
 }  // namespace
 
-void TestBudget::Check() const {
-  if (!(max_minutes >= 0)) throw OptionsError("max_minutes must be at least 0.");
-}
-
 BudgetedVerifier::BudgetedVerifier(PairVerifier& verifier, const TestBudget& budget,
                                    int num_threads, std::function<double()> seconds, Order order)
     : verifier_(verifier),

@@ -5,19 +5,9 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/pipeline/options.h"
 
 namespace colmap_graphmatch {
-
-// What a run may spend on tests. 0: without a limit.
-struct TestBudget {
-  std::size_t max_pairs = 0;  // That this run tests; known ones cost nothing.
-  double max_minutes = 0;     // Since the start of the run, after which nothing is tested.
-
-  bool IsUnlimited() const { return max_pairs == 0 && max_minutes <= 0; }
-
-  // Throws OptionsError.
-  void Check() const;
-};
 
 // Has another verifier test pairs as long as a budget lasts. Of a batch that is too much for what
 // is left, the most promising pairs are tested; then, and when time is over, Verify returns false,

@@ -1,9 +1,14 @@
+#include "colmap_graphmatch/pipeline/options.h"
+
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/thread_pool.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
 #include "colmap_graphmatch/pipeline/strategy.h"
 
 namespace colmap_graphmatch {
+
+void TestBudget::Check() const {
+  if (!(max_minutes >= 0)) throw OptionsError("max_minutes must be at least 0.");
+}
 
 void PipelineOptions::Check() const {
   if (!match_list_path.empty() && strategy != Strategy::kGraphMatch) {
@@ -16,9 +21,8 @@ void PipelineOptions::Check() const {
         "--GraphMatching.match_list_path lists pairs, --VocabTreeMatching.match_list_path images "
         "that look for partners: give one of them.");
   }
-  const bool ranks = match_list_path.empty() && strategy != Strategy::kExhaustive;
-  if (!ranks && (!ranking.ranking_path.empty() || !ranking.export_path.empty() ||
-                 !ranking.vectors.vectors_path.empty())) {
+  if (!RanksImages() && (!ranking.ranking_path.empty() || !ranking.export_path.empty() ||
+                         !ranking.vectors.vectors_path.empty())) {
     throw OptionsError(
         "--GraphMatching.ranking_path, --GraphMatching.vectors_path and "
         "--GraphMatching.export_vectors need a strategy that ranks images; a list of pairs and the "
@@ -28,12 +32,6 @@ void PipelineOptions::Check() const {
   if (num_retrieved_images < 0) {
     throw OptionsError("num_retrieved_images is " + std::to_string(num_retrieved_images) +
                        "; it must be positive, or 0 to have it chosen.");
-  }
-  if (dry_run && (!ranks || !replay_path.empty())) {
-    throw OptionsError(
-        "--GraphMatching.dry_run shows which pairs a strategy that ranks images would test first; "
-        "with a list of pairs, the strategy exhaustive or --GraphMatching.replay_path there is "
-        "nothing to show.");
   }
   RetrievalOptionsOf(*this).Check();
   budget.Check();

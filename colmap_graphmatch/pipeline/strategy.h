@@ -10,7 +10,7 @@
 #include "colmap_graphmatch/graph/pair_proposer.h"
 #include "colmap_graphmatch/graph/pair_restrictions.h"
 #include "colmap_graphmatch/graph/retrieval.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/options.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 
 namespace colmap_graphmatch {

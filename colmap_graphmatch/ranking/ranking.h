@@ -6,12 +6,9 @@
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/base/types.h"
 
 namespace colmap_graphmatch {
-
-// The number of an image among those that have a vector: 0 .. N - 1. The matching graph counts
-// images the same way.
-using Vertex = std::uint32_t;
 
 struct RankingOptions {
   // The length of the ranked list that is kept for every image; what the loop needs beyond it is

@@ -41,14 +41,14 @@ std::string PrintableName(const std::string& name) {
   return printable;
 }
 
-Graph MakeGraph(const PipelineResult& result) {
-  const std::vector<GraphEdge> edges = EdgesOf(result, ImageIndex(result.images));
-  Graph graph(result.images.size());
-  for (std::size_t i = 0; i < result.images.size(); ++i) {
-    graph[i] = {result.images[i].id, PrintableName(result.images[i].name), 0};
+Graph MakeGraph(const RunDetails& details) {
+  const std::vector<GraphEdge> edges = EdgesOf(details, ImageIndex(details.images));
+  Graph graph(details.images.size());
+  for (std::size_t i = 0; i < details.images.size(); ++i) {
+    graph[i] = {details.images[i].id, PrintableName(details.images[i].name), 0};
   }
   std::size_t number = 0;
-  for (const std::vector<std::size_t>& component : FindComponents(result.images.size(), edges)) {
+  for (const std::vector<std::size_t>& component : FindComponents(details.images.size(), edges)) {
     ++number;
     for (const std::size_t image : component) graph[image].component = number;
   }
@@ -58,32 +58,14 @@ Graph MakeGraph(const PipelineResult& result) {
   return graph;
 }
 
-// The pairs of a list, best first.
-std::vector<ImagePair> SortedPairs(const PipelineResult& result) {
-  std::vector<ImagePair> pairs;
-  if (result.dry_run) {
-    for (const CandidatePair& candidate : result.candidates) pairs.push_back(candidate.pair);
-    return pairs;
-  }
-  std::vector<VerifiedPair> edges;
-  std::copy_if(result.tested.begin(), result.tested.end(), std::back_inserter(edges),
-               [](const VerifiedPair& verified) { return verified.outcome == PairOutcome::kEdge; });
-  std::stable_sort(edges.begin(), edges.end(), [](const VerifiedPair& a, const VerifiedPair& b) {
-    return a.num_inliers > b.num_inliers;
-  });
-  for (const VerifiedPair& edge : edges) pairs.push_back(edge.pair);
-  return pairs;
-}
-
-}  // namespace
-
-PairListNames WritePairList(const std::filesystem::path& path, const PipelineResult& result) {
-  const ImageIndex index(result.images);
+PairListNames WriteList(const std::filesystem::path& path, const std::vector<ImageRecord>& images,
+                        const std::vector<ImagePair>& pairs) {
+  const ImageIndex index(images);
   PairListNames names;
   WriteWholeFile(path, [&](std::ostream& file) {
-    for (const ImagePair& pair : SortedPairs(result)) {
-      const std::string& name1 = result.images[index.Of(pair.id1)].name;
-      const std::string& name2 = result.images[index.Of(pair.id2)].name;
+    for (const ImagePair& pair : pairs) {
+      const std::string& name1 = images[index.Of(pair.id1)].name;
+      const std::string& name2 = images[index.Of(pair.id2)].name;
       if ((name1 + name2).find_first_of("\n\r\t") != std::string::npos) {
         ++names.num_left_out;
         continue;
@@ -96,8 +78,28 @@ PairListNames WritePairList(const std::filesystem::path& path, const PipelineRes
   return names;
 }
 
-void WriteGraph(const std::filesystem::path& path, const PipelineResult& result) {
-  Graph graph = MakeGraph(result);
+}  // namespace
+
+PairListNames WritePairList(const std::filesystem::path& path, const RunDetails& details) {
+  std::vector<VerifiedPair> edges;
+  std::copy_if(details.tested.begin(), details.tested.end(), std::back_inserter(edges),
+               [](const VerifiedPair& verified) { return verified.outcome == PairOutcome::kEdge; });
+  std::stable_sort(edges.begin(), edges.end(), [](const VerifiedPair& a, const VerifiedPair& b) {
+    return a.num_inliers > b.num_inliers;
+  });
+  std::vector<ImagePair> pairs;
+  for (const VerifiedPair& edge : edges) pairs.push_back(edge.pair);
+  return WriteList(path, details.images, pairs);
+}
+
+PairListNames WritePairList(const std::filesystem::path& path, const CandidateList& candidates) {
+  std::vector<ImagePair> pairs;
+  for (const CandidatePair& candidate : candidates.pairs) pairs.push_back(candidate.pair);
+  return WriteList(path, candidates.images, pairs);
+}
+
+void WriteGraph(const std::filesystem::path& path, const RunDetails& details) {
+  Graph graph = MakeGraph(details);
   const bool is_dot = path.extension() == ".dot" || path.extension() == ".gv";
   if (is_dot) {
     // Boost escapes quotation marks alone.

@@ -3,13 +3,12 @@
 #include <cstddef>
 #include <filesystem>
 
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/result.h"
 
 namespace colmap_graphmatch {
 
-// What a run found, for other programs (docs/formats.md). The results need details
-// (PipelineOptions::keep_details), or are those of a dry run. The functions throw FileError if the
-// file cannot be written; then what was there before is still there.
+// What a run found, for other programs (docs/formats.md). The functions throw FileError if the file
+// cannot be written; then what was there before is still there.
 
 // What of the names of images such a list cannot hold as it should.
 struct PairListNames {
@@ -18,12 +17,13 @@ struct PairListNames {
 };
 
 // Two names a line, as COLMAP's matches_importer and hloc read them: the edges, those with the most
-// inliers first, or the candidates of a dry run, nearest first. A space between them, or a tab if
+// inliers first, or the candidates, nearest first. A space between them, or a tab if
 // one of them has spaces.
-PairListNames WritePairList(const std::filesystem::path& path, const PipelineResult& result);
+PairListNames WritePairList(const std::filesystem::path& path, const RunDetails& details);
+PairListNames WritePairList(const std::filesystem::path& path, const CandidateList& candidates);
 
 // The matching graph: the images with their ids, names and components, the edges with their numbers
 // of inliers. GraphML, or the language of Graphviz if the path ends in .dot or .gv.
-void WriteGraph(const std::filesystem::path& path, const PipelineResult& result);
+void WriteGraph(const std::filesystem::path& path, const RunDetails& details);
 
 }  // namespace colmap_graphmatch

@@ -131,7 +131,7 @@ std::string MakeJsonReport(const ReportData& data) {
   members.Add("schema", kSchema);
   members.Add("version", 1);
   members.Add("program", std::string("graphmatch_matcher ") + kVersion);
-  members.Add("replay", data.replayed);
+  members.Add("replay", data.modelled_seconds.has_value());
   members.Add("finished", data.finished);
   members.Add("stopped_by", OrNull(data.stopped_by));
   if (!data.finished) {

@@ -4,12 +4,12 @@
 #include <unordered_map>
 #include <vector>
 
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/result.h"
 #include "colmap_graphmatch/report/graph_analysis.h"
 
 namespace colmap_graphmatch {
 
-// A result's images by their places in PipelineResult::images, as reports and exports count them.
+// A run's images by their places in RunDetails::images, as reports and exports count them.
 class ImageIndex {
  public:
   explicit ImageIndex(const std::vector<ImageRecord>& images) {
@@ -23,9 +23,9 @@ class ImageIndex {
 };
 
 // Ascending.
-inline std::vector<GraphEdge> EdgesOf(const PipelineResult& result, const ImageIndex& index) {
+inline std::vector<GraphEdge> EdgesOf(const RunDetails& details, const ImageIndex& index) {
   std::vector<GraphEdge> edges;
-  for (const VerifiedPair& verified : result.tested) {
+  for (const VerifiedPair& verified : details.tested) {
     if (verified.outcome != PairOutcome::kEdge) continue;
     edges.push_back(
         {index.Of(verified.pair.id1), index.Of(verified.pair.id2), verified.num_inliers});

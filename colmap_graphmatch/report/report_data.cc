@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <variant>
 
 #include "colmap_graphmatch/report/matching_graph_view.h"
 
@@ -98,18 +99,18 @@ ReportDetails::ImageAlone WithPlaces(const ImageWithoutEdge& image, const ImageI
   return alone;
 }
 
-ReportDetails MakeDetails(const PipelineOptions& options, const PipelineResult& result) {
-  const ImageIndex index(result.images);
+ReportDetails MakeDetails(const PipelineOptions& options, const RunDetails& run) {
+  const ImageIndex index(run.images);
   ReportDetails details;
-  details.images = result.images;
-  details.edges = EdgesOf(result, index);
+  details.images = run.images;
+  details.edges = EdgesOf(run, index);
   details.components = FindComponents(details.images.size(), details.edges);
-  SetNonedges(result.tested, index, &details);
-  details.discovery = result.discovery;
+  SetNonedges(run.tested, index, &details);
+  details.discovery = run.discovery;
   SetCutPlaces(&details);
   const auto strong = static_cast<std::uint32_t>(2 * options.verification.min_num_inliers);
   details.weak_links = FindWeakLinks(details.images.size(), details.edges, strong, kMinGroup);
-  for (const ImageWithoutEdge& image : result.images_without_edge) {
+  for (const ImageWithoutEdge& image : run.images_without_edge) {
     details.images_without_edge.push_back(WithPlaces(image, index));
   }
   return details;
@@ -120,12 +121,11 @@ ReportDetails MakeDetails(const PipelineOptions& options, const PipelineResult& 
 ReportData MakeReportData(const PipelineOptions& options, const PipelineResult& result) {
   const ExplorationResult& matching = result.matching;
   ReportData data;
-  data.replayed = result.replayed;
   data.finished = matching.finished;
   data.stopped_by = NameOf(result.stopped_by);
   data.num_expected_tests_left = result.num_expected_tests_left;
   data.strategy = NameOfStrategy(options);
-  if (!result.listed) data.descriptor = NameOfDescriptor(options.ranking);
+  if (options.RanksImages()) data.descriptor = NameOfDescriptor(options.ranking);
   data.min_num_inliers = options.verification.min_num_inliers;
   data.num_threads = result.num_threads;
   data.peak_memory_mb = PeakMemory();
@@ -139,10 +139,11 @@ ReportData MakeReportData(const PipelineOptions& options, const PipelineResult& 
   data.preprocessing_seconds = result.preprocessing_seconds;
   data.matching_seconds = result.matching_seconds;
   data.total_seconds = result.total_seconds;
-  if (result.replayed) data.modelled_seconds = result.modelled_seconds;
+  const auto* replay = std::get_if<ReplayCost>(&result.cost);
+  if (replay != nullptr) data.modelled_seconds = replay->modelled_seconds;
   data.stages = matching.stages;
   data.iterations = matching.iterations;
-  if (options.keep_details) data.details = MakeDetails(options, result);
+  if (result.details) data.details = MakeDetails(options, *result.details);
   return data;
 }
 

@@ -7,7 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/pipeline/options.h"
+#include "colmap_graphmatch/pipeline/result.h"
 #include "colmap_graphmatch/report/graph_analysis.h"
 
 namespace colmap_graphmatch {
@@ -53,7 +54,6 @@ inline constexpr std::size_t kMaxNonedges = 500000;
 // All that a report says of a run: what was found and what it cost. Everything in report/ that
 // writes or shows a report reads this.
 struct ReportData {
-  bool replayed = false;
   bool finished = true;
   std::optional<std::string> stopped_by;  // "signal", "max_pairs" or "max_minutes".
   std::optional<std::size_t> num_expected_tests_left;
@@ -74,7 +74,7 @@ struct ReportData {
   ImageRankingSeconds preprocessing_seconds;
   double matching_seconds = 0;
   double total_seconds = 0;
-  std::optional<double> modelled_seconds;  // Of a replay.
+  std::optional<double> modelled_seconds;  // Of a replay alone.
 
   StagesStatistics stages;
   std::vector<IterationStatistics> iterations;  // Of the paper's loop.

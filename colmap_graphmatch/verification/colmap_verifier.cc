@@ -48,13 +48,14 @@ void AddMatchingOptions(const DescriptorMatchingOptions& matching,
 
 }  // namespace
 
-ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const ColmapInstallation& colmap,
+ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const VerificationPlan& plan,
+                               const ColmapInstallation& colmap,
                                const std::filesystem::path& database_path,
                                const std::vector<ImageRecord>& images,
                                const std::filesystem::path& work_path, const StopRequest& stop,
                                const std::function<void(const std::string&)>& on_warning)
     : options_(options),
-      plan_(PlanVerification(options, colmap)),
+      plan_(plan),
       colmap_(colmap),
       database_path_(database_path),
       work_path_(work_path),

@@ -29,9 +29,10 @@ class ColmapVerifier : public GeometryVerifier {
   // existing directory for the shards. stop must outlive the verifier. on_warning is called by the
   // constructor alone. Throws ColmapError if COLMAP cannot make an empty database, OptionsError if
   // it lacks an option that may not be left out.
-  ColmapVerifier(const VerificationOptions& options, const ColmapInstallation& colmap,
-                 const std::filesystem::path& database_path, const std::vector<ImageRecord>& images,
-                 const std::filesystem::path& work_path, const StopRequest& stop,
+  ColmapVerifier(const VerificationOptions& options, const VerificationPlan& plan,
+                 const ColmapInstallation& colmap, const std::filesystem::path& database_path,
+                 const std::vector<ImageRecord>& images, const std::filesystem::path& work_path,
+                 const StopRequest& stop,
                  const std::function<void(const std::string&)>& on_warning);
 
   ShardOutcome Verify(const std::vector<ShardPair>& pairs,

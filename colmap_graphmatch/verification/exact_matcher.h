@@ -11,19 +11,9 @@
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/matching/descriptor_cache.h"
 #include "colmap_graphmatch/matching/descriptor_matcher.h"
+#include "colmap_graphmatch/verification/options.h"
 
 namespace colmap_graphmatch {
-
-struct ExactMatcherOptions {
-  DescriptorMatchingOptions matching;
-
-  // Descriptors kept in memory, in units of 10^9 bytes; 0: a quarter of the memory. What does not
-  // fit is read again, with the same result.
-  double cache_gb = 0;
-
-  // Throws OptionsError.
-  void Check() const;
-};
 
 // Matches the descriptors of pairs of images of a database. Thread-safe.
 class ExactMatcher {

@@ -4,6 +4,7 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/verification/colmap_installation.h"
 
 namespace colmap_graphmatch {
 
@@ -16,7 +17,6 @@ const std::string* FindOption(const std::map<std::string, std::string>& options,
 }
 
 void VerificationOptions::Check() const {
-  EffectiveNumThreads(num_threads);
   exact.Check();
   for (const char* name : {"max_ratio", "max_distance", "cross_check", "max_num_matches"}) {
     if (FindOption(colmap_options, name) == nullptr) continue;
@@ -31,7 +31,7 @@ void VerificationOptions::Check() const {
   if (!(lock_timeout >= 0)) throw OptionsError("The lock timeout must not be negative.");
 }
 
-VerificationPlan PlanVerification(const VerificationOptions& options,
+VerificationPlan PlanVerification(const VerificationOptions& options, int num_threads,
                                   const ColmapInstallation& colmap) {
   options.Check();
   using Matcher = VerificationOptions::Matcher;
@@ -40,7 +40,7 @@ VerificationPlan PlanVerification(const VerificationOptions& options,
   plan.matches_here =
       options.matcher == Matcher::kExact || (options.matcher == Matcher::kAuto && !gpu);
   plan.uses_gpu = gpu && !plan.matches_here;
-  const int num_threads = EffectiveNumThreads(options.num_threads);
+  num_threads = EffectiveNumThreads(num_threads);
   plan.num_processes = options.num_processes > 0 ? options.num_processes
                        : plan.uses_gpu           ? 1
                                                  : num_threads;

@@ -4,10 +4,23 @@
 #include <string>
 
 #include "colmap_graphmatch/base/enum_words.h"
-#include "colmap_graphmatch/verification/colmap_installation.h"
-#include "colmap_graphmatch/verification/exact_matcher.h"
+#include "colmap_graphmatch/matching/options.h"
 
 namespace colmap_graphmatch {
+
+struct ColmapInstallation;
+
+// Of matching by this library.
+struct ExactMatcherOptions {
+  DescriptorMatchingOptions matching;
+
+  // Descriptors kept in memory, in units of 10^9 bytes; 0: a quarter of the memory. What does not
+  // fit is read again, with the same result.
+  double cache_gb = 0;
+
+  // Throws OptionsError.
+  void Check() const;
+};
 
 struct VerificationOptions {
   // Who matches descriptors; COLMAP gets the options of exact.matching. kAuto: COLMAP if it has a
@@ -17,12 +30,9 @@ struct VerificationOptions {
 
   ExactMatcherOptions exact;
 
-  // The cores that all COLMAP processes together may use; -1: all.
-  int num_threads = -1;
-
-  // COLMAP processes at a time; each gets num_threads / num_processes threads. 0: num_threads
-  // processes of one thread without a GPU, and one process with it (docs/design.md). Descriptors
-  // are matched by one thread for each process, when that process does not run.
+  // COLMAP processes at a time, which share the run's threads. 0: one of one thread each without a
+  // GPU, and one process with it (docs/design.md). Descriptors are matched by one thread for each
+  // process, when that process does not run.
   int num_processes = 0;
 
   // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
@@ -69,7 +79,9 @@ struct VerificationPlan {
   int threads_per_process = 1;
 };
 
-VerificationPlan PlanVerification(const VerificationOptions& options,
+// num_threads: the cores that all COLMAP processes together may use, at least 1; -1: all. Throws
+// OptionsError.
+VerificationPlan PlanVerification(const VerificationOptions& options, int num_threads,
                                   const ColmapInstallation& colmap);
 
 }  // namespace colmap_graphmatch

@@ -10,8 +10,8 @@
 
 #include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/database/database.h"
-#include "colmap_graphmatch/pipeline/image_vectors.h"
 #include "colmap_graphmatch/ranking/ranking.h"
+#include "colmap_graphmatch/vectors/image_vectors.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -24,7 +24,7 @@ void Run(const char* path, int num_threads) {
   const double read = stopwatch.Seconds();
   const ImageVectorOptions options;
   const VectorModelTraining training =
-      LearnVectorModel(options, database, images, threads, StopRequest());
+      LearnVectorModel(options, 0, database, images, threads, StopRequest());
   const double mixture = stopwatch.Seconds() - read;
   std::vector<float> vectors =
       EncodeImages(options, training.model, database, images, threads, StopRequest());

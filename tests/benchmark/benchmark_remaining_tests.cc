@@ -10,7 +10,7 @@
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/cli/options.h"
-#include "colmap_graphmatch/pipeline/graphmatch_pipeline.h"
+#include "colmap_graphmatch/colmap_graphmatch.h"
 
 namespace colmap_graphmatch {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/files/pair_list.h"
 #include "colmap_graphmatch/matching/descriptor_matcher.h"
-#include "colmap_graphmatch/pipeline/pair_list.h"
 #include "tests/support/matching_targets.h"
 
 namespace colmap_graphmatch {

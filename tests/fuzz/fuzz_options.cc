@@ -11,7 +11,7 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/cli/options.h"
-#include "colmap_graphmatch/pipeline/pair_list.h"
+#include "colmap_graphmatch/files/pair_list.h"
 #include "tests/support/synthetic_database.h"
 
 namespace colmap_graphmatch {

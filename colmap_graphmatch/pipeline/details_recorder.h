@@ -4,36 +4,15 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/pair_verifier.h"
-#include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/graph/explorer.h"
+#include "colmap_graphmatch/pipeline/result.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 
 namespace colmap_graphmatch {
 
-// How far a run had come after a test.
-struct DiscoveryPoint {
-  LoopStage stage = LoopStage::kSampling;
-  int iteration = 0;
-  std::size_t num_tested = 0;  // By this run, and
-  std::size_t num_edges = 0;   // the edges among them.
-  double seconds = 0;          // Since the start of the run.
-};
-
-// An image that no other matched, and what came nearest to it.
-struct ImageWithoutEdge {
-  struct Candidate {
-    ImageId image = 0;
-    double distance = 0;  // Of the ranking; infinite without one.
-    std::uint32_t num_inliers = 0;
-    std::int32_t num_matches = -1;  // Negative: not known.
-  };
-  ImageId image = 0;
-  std::vector<Candidate> candidates;  // The nearest tested images, nearest first.
-  std::size_t num_failed = 0;         // Pairs with it on which the verifier failed.
-};
-
-// What reports and exports need to know of a run beyond its sums.
-class RunRecord {
+// Takes down what RunDetails need while a run goes on.
+class DetailsRecorder {
  public:
   // The pair that the progress reports. The curve keeps at most kMaxPoints points.
   void Add(const LoopProgress& progress, double seconds);

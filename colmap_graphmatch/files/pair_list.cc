@@ -1,10 +1,10 @@
-#include "colmap_graphmatch/pipeline/pair_list.h"
+#include "colmap_graphmatch/files/pair_list.h"
 
 #include <algorithm>
 #include <unordered_map>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/pipeline/text_file.h"
+#include "colmap_graphmatch/files/text_file.h"
 
 namespace colmap_graphmatch {
 

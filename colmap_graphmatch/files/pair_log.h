@@ -13,10 +13,10 @@
 namespace colmap_graphmatch {
 
 // Writes every pair that a run tests to a CSV file (docs/formats.md), in the order of the answers.
-class TestLog {
+class PairLog {
  public:
   // Throws FileError if the file cannot be written.
-  TestLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
+  PairLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images);
 
   // The pair that the progress reports, unless an earlier run had tested it.
   void Write(const LoopProgress& progress, double seconds);

@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/text_file.h"
+#include "colmap_graphmatch/files/text_file.h"
 
 #include <algorithm>
 #include <string_view>

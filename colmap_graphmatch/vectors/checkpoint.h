@@ -1,39 +1,40 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "colmap_graphmatch/base/stop_request.h"
+#include "colmap_graphmatch/base/messages.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/database/state_file.h"
-#include "colmap_graphmatch/pipeline/image_vectors.h"
-#include "colmap_graphmatch/pipeline/vector_model.h"
+#include "colmap_graphmatch/vectors/options.h"
+#include "colmap_graphmatch/vectors/vector_model.h"
 
 namespace colmap_graphmatch {
 
-// What this run keeps for the next one, in the state file of the database, and what it finds there.
-// A file that cannot be written costs a warning: the run goes on without.
-class RunState {
+// What this run keeps for the next one in the state file of the database (database/state_file.h),
+// and what it finds there: the model, the vectors, the seeds of the loop. A file that cannot be
+// written costs a warning: the run goes on without.
+class Checkpoint {
  public:
-  using Say = std::function<void(const std::string&)>;
-
   // Keeps nothing and finds nothing.
-  RunState() = default;
+  Checkpoint() = default;
 
-  // Waits for another run on the same database. Throws
-  // DatabaseLockedError if it is still at work then; StoppedError if stop asks for it.
-  RunState(const std::filesystem::path& database_path, const sqlite::LockPatience& patience,
-           const Say& info, const Say& warn);
+  // Waits for another run on the same database. Throws DatabaseLockedError if it is still at work
+  // then; StoppedError if stop asks for it.
+  Checkpoint(const std::filesystem::path& database_path, const sqlite::LockPatience& patience,
+             const Messages& messages);
 
-  // Chooses what is kept: vectors of these images under these options. photos_checksum: of the
-  // files, for GIST.
-  void Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images,
-              const std::string& photos_checksum);
+  // Chooses what is kept: vectors of these images under these options and this seed.
+  // photos_checksum: of the files, for GIST.
+  void Select(const ImageVectorOptions& options, std::uint64_t seed,
+              std::vector<ImageFingerprint> images, const std::string& photos_checksum);
 
   // The same for a ranking that was given from outside and described by `ranking_key`: nothing but
   // the seeds is kept, and what is there of vectors stays.
@@ -61,7 +62,7 @@ class RunState {
   void Try(const std::function<void()>& action);
   std::string SeedsKey(const std::string& loop_key) const;
 
-  Say warn_;
+  Messages messages_;
   std::unique_ptr<StateFile> file_;
   bool usable_ = false;
   VectorModelShape shape_;

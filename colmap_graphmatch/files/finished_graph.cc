@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/finished_graph.h"
+#include "colmap_graphmatch/files/finished_graph.h"
 
 #include <algorithm>
 #include <boost/algorithm/string/classification.hpp>
@@ -8,7 +8,7 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/input_file.h"
-#include "colmap_graphmatch/pipeline/text_file.h"
+#include "colmap_graphmatch/files/text_file.h"
 
 namespace colmap_graphmatch {
 namespace {

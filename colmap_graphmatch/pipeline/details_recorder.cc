@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/run_record.h"
+#include "colmap_graphmatch/pipeline/details_recorder.h"
 
 #include <algorithm>
 #include <limits>
@@ -14,7 +14,7 @@ bool SameBatch(const DiscoveryPoint& a, const DiscoveryPoint& b) {
 
 }  // namespace
 
-void RunRecord::Add(const LoopProgress& progress, double seconds) {
+void DetailsRecorder::Add(const LoopProgress& progress, double seconds) {
   if (progress.last.is_known) return;
   tested_.push_back(progress.last);
   is_sorted_ = false;
@@ -42,8 +42,8 @@ void RunRecord::Add(const LoopProgress& progress, double seconds) {
   points_ = std::move(kept);
 }
 
-void RunRecord::AddKnown(const std::vector<VerifiedPair>& known,
-                         const std::vector<ImageRecord>& images) {
+void DetailsRecorder::AddKnown(const std::vector<VerifiedPair>& known,
+                               const std::vector<ImageRecord>& images) {
   const auto exists = [&images](ImageId id) {
     const auto place =
         std::lower_bound(images.begin(), images.end(), id,
@@ -57,7 +57,7 @@ void RunRecord::AddKnown(const std::vector<VerifiedPair>& known,
   is_sorted_ = false;
 }
 
-std::vector<DiscoveryPoint> RunRecord::Discovery() const {
+std::vector<DiscoveryPoint> DetailsRecorder::Discovery() const {
   std::vector<DiscoveryPoint> points = points_;
   if (last_.num_tested > 0 && points.back().num_tested != last_.num_tested) {
     points.push_back(last_);
@@ -65,7 +65,7 @@ std::vector<DiscoveryPoint> RunRecord::Discovery() const {
   return points;
 }
 
-const std::vector<VerifiedPair>& RunRecord::Tested() {
+const std::vector<VerifiedPair>& DetailsRecorder::Tested() {
   if (!is_sorted_) {
     std::sort(tested_.begin(), tested_.end(),
               [](const VerifiedPair& a, const VerifiedPair& b) { return a.pair < b.pair; });

@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/ranked_lists.h"
+#include "colmap_graphmatch/files/ranked_lists.h"
 
 #include <boost/algorithm/string/classification.hpp>
 #include <boost/algorithm/string/split.hpp>
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/pipeline/text_file.h"
+#include "colmap_graphmatch/files/text_file.h"
 
 namespace colmap_graphmatch {
 

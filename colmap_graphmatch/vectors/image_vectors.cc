@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/image_vectors.h"
+#include "colmap_graphmatch/vectors/image_vectors.h"
 
 #include <algorithm>
 #include <future>
@@ -6,7 +6,6 @@
 #include <system_error>
 #include <utility>
 
-#include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/largest_scales.h"
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/encoding/descriptor_selection.h"
@@ -70,42 +69,9 @@ bool HasMixture(ImageVectorOptions::Descriptor descriptor) {
          descriptor == ImageVectorOptions::Descriptor::kVlad;
 }
 
-void ImageVectorOptions::Check() const {
-  gmm.Check();
-  if (pca_dim < 0 || pca_dim > kDescriptorDim) {
-    throw OptionsError("pca_dim is " + std::to_string(pca_dim) +
-                       "; it must be at most 128, or 0 for no PCA.");
-  }
-  if (descriptor == Descriptor::kGist && image_path.empty()) {
-    throw OptionsError("GIST describes the photos themselves: give --image_path, where they are.");
-  }
-  if ((descriptor == Descriptor::kFile) != !vectors_path.empty()) {
-    throw OptionsError(
-        "--GraphMatching.descriptor file and --GraphMatching.vectors_path belong together: give "
-        "both or none.");
-  }
-  if (num_training_descriptors < 1) {
-    throw OptionsError("num_training_descriptors is " + std::to_string(num_training_descriptors) +
-                       "; the mixture needs at least 1.");
-  }
-  if (max_num_features < 1) {
-    throw OptionsError("max_num_features is " + std::to_string(max_num_features) +
-                       "; an image vector needs at least 1.");
-  }
-}
-
-std::string ImageVectorOptions::Key() const {
-  // Does not compile if a field is forgotten.
-  const auto& [described_by, photos, vectors, dim, mixture, num_training, num_features, own_seed] =
-      *this;
-  return "descriptor " + std::to_string(static_cast<int>(described_by)) + ", PCA " +
-         std::to_string(dim) + ", " + mixture.Key() + ", training " + std::to_string(num_training) +
-         ", features " + std::to_string(num_features) + ", seed " + std::to_string(own_seed);
-}
-
-VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database& database,
-                                     const std::vector<ImageRecord>& images, ThreadPool& threads,
-                                     const StopRequest& stop) {
+VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, std::uint64_t seed,
+                                     Database& database, const std::vector<ImageRecord>& images,
+                                     ThreadPool& threads, const StopRequest& stop) {
   VectorModelTraining training;
   if (!HasMixture(options.descriptor)) return training;
   const std::size_t per_image =
@@ -122,7 +88,7 @@ VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database
       [&](const ImageRecord& image) {
         const Descriptors descriptors = database.ReadDescriptors(image);
         const Random random(
-            {options.seed, static_cast<std::uint64_t>(RandomStage::kTrainingSample), image.id});
+            {seed, static_cast<std::uint64_t>(RandomStage::kTrainingSample), image.id});
         return SelectedDescriptors(descriptors,
                                    SelectRandom(descriptors.num_rows, per_image, random));
       },
@@ -134,7 +100,7 @@ VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, Database
     training.model.pca = LearnPca(samples, options.pca_dim, threads);
     samples = training.model.pca.Project(samples);
   }
-  GmmTraining gmm = TrainGmm(options.gmm, samples, threads, &stop);
+  GmmTraining gmm = TrainGmm(options.gmm, seed, samples, threads, &stop);
   training.model.mixture = std::move(gmm.mixture);
   training.num_iterations = gmm.log_likelihoods.size();
   training.converged = gmm.converged;

@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/test_log.h"
+#include "colmap_graphmatch/files/pair_log.h"
 
 #include <array>
 #include <cstdio>
@@ -19,13 +19,13 @@ std::string CsvField(const std::string& text) {
 
 }  // namespace
 
-TestLog::TestLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images)
+PairLog::PairLog(const std::filesystem::path& path, const std::vector<ImageRecord>& images)
     : path_(path), file_(path, GrowingFile::Mode::kAnew) {
   for (const ImageRecord& image : images) names_[image.id] = CsvField(image.name);
   file_ << "test,seconds,stage,iteration,image1,image2,inliers,edge\n" << std::flush;
 }
 
-void TestLog::Write(const LoopProgress& progress, double seconds) {
+void PairLog::Write(const LoopProgress& progress, double seconds) {
   if (progress.last.is_known || progress.last.outcome == PairOutcome::kFailed) return;
   std::array<char, 32> time = {};
   std::snprintf(time.data(), time.size(), "%.4f", seconds);
@@ -35,7 +35,7 @@ void TestLog::Write(const LoopProgress& progress, double seconds) {
         << (progress.last.outcome == PairOutcome::kEdge ? 1 : 0) << '\n';
 }
 
-void TestLog::Close() {
+void PairLog::Close() {
   file_.flush();
   if (file_.Error() == 0) return;
   throw FileError("Cannot write the log of tests " + path_.string() + ": " +

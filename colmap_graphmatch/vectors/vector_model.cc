@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/vector_model.h"
+#include "colmap_graphmatch/vectors/vector_model.h"
 
 #include <array>
 #include <cstdint>

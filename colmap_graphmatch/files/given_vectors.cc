@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/given_vectors.h"
+#include "colmap_graphmatch/files/given_vectors.h"
 
 #include <algorithm>
 #include <boost/crc.hpp>

@@ -1,4 +1,4 @@
-#include "colmap_graphmatch/pipeline/run_state.h"
+#include "colmap_graphmatch/vectors/checkpoint.h"
 
 #include <algorithm>
 #include <boost/crc.hpp>
@@ -18,48 +18,50 @@ std::string Checksum(const void* data, std::size_t size) {
 
 }  // namespace
 
-RunState::RunState(const std::filesystem::path& database_path, const sqlite::LockPatience& patience,
-                   const Say& info, const Say& warn)
-    : warn_(warn) {
+Checkpoint::Checkpoint(const std::filesystem::path& database_path,
+                       const sqlite::LockPatience& patience, const Messages& messages)
+    : messages_(messages) {
   try {
     try {
       file_ = std::make_unique<StateFile>(database_path, 0);
     } catch (const DatabaseLockedError&) {
       if (patience.seconds <= 0) throw;
-      info("Another graphmatch_matcher works on this database; waiting for it, up to " +
-           std::to_string(static_cast<long>(patience.seconds)) +
-           " s (--GraphMatching.lock_timeout).");
+      messages_.info("Another graphmatch_matcher works on this database; waiting for it, up to " +
+                     std::to_string(static_cast<long>(patience.seconds)) +
+                     " s (--GraphMatching.lock_timeout).");
       file_ = std::make_unique<StateFile>(database_path, patience);
     }
     usable_ = true;
   } catch (const DatabaseLockedError&) {
     throw;
   } catch (const DatabaseError& error) {
-    warn(std::string("What this run computes will not be kept for the next one, and nothing keeps "
-                     "another graphmatch_matcher from the database. ") +
-         error.what());
+    messages_.warn(
+        std::string("What this run computes will not be kept for the next one, and nothing keeps "
+                    "another graphmatch_matcher from the database. ") +
+        error.what());
   }
 }
 
-void RunState::Try(const std::function<void()>& action) {
+void Checkpoint::Try(const std::function<void()>& action) {
   if (!usable_) return;
   try {
     try {
       action();
     } catch (const sqlite::DamagedFileError&) {
-      warn_(file_->Path().string() +
-            " is damaged and is made anew: what the last run kept is computed again.");
+      messages_.warn(file_->Path().string() +
+                     " is damaged and is made anew: what the last run kept is computed again.");
       file_->MakeAnew();
     }
   } catch (const DatabaseError& error) {
     // The file stays open: its lock keeps other runs away.
     usable_ = false;
-    warn_(std::string("What this run computes will not be kept for the next one. ") + error.what());
+    messages_.warn(std::string("What this run computes will not be kept for the next one. ") +
+                   error.what());
   }
 }
 
-void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFingerprint> images,
-                      const std::string& photos_checksum) {
+void Checkpoint::Select(const ImageVectorOptions& options, std::uint64_t seed,
+                        std::vector<ImageFingerprint> images, const std::string& photos_checksum) {
   images_ = std::move(images);
   if (options.descriptor == ImageVectorOptions::Descriptor::kGist) {
     shape_ = VectorModelShape();
@@ -67,21 +69,21 @@ void RunState::Select(const ImageVectorOptions& options, std::vector<ImageFinger
     return;
   }
   shape_ = {options.gmm.num_components, options.pca_dim};
-  vectors_key_ = options.Key();
+  vectors_key_ = options.Key(seed);
 }
 
-void RunState::SelectGiven(const std::string& ranking_key, std::vector<ImageFingerprint> images) {
+void Checkpoint::SelectGiven(const std::string& ranking_key, std::vector<ImageFingerprint> images) {
   images_ = std::move(images);
   vectors_key_ = ranking_key;
 }
 
-std::vector<ImageId> RunState::FindChanged() {
+std::vector<ImageId> Checkpoint::FindChanged() {
   std::vector<ImageId> changed;
   Try([&] { changed = file_->FindChanged(images_); });
   return changed;
 }
 
-std::optional<VectorModel> RunState::ReadModel() {
+std::optional<VectorModel> Checkpoint::ReadModel() {
   std::optional<VectorModel> model;
   Try([&] {
     if (file_->CountVectors(images_) * 2 < images_.size()) return;
@@ -93,7 +95,7 @@ std::optional<VectorModel> RunState::ReadModel() {
   return model;
 }
 
-void RunState::KeepModel(const VectorModel& model) {
+void Checkpoint::KeepModel(const VectorModel& model) {
   Try([&] {
     const sqlite::Blob blob = Serialize(model);
     model_checksum_ = Checksum(blob.data(), blob.size());
@@ -101,14 +103,14 @@ void RunState::KeepModel(const VectorModel& model) {
   });
 }
 
-std::vector<bool> RunState::ReadVectors(std::size_t dim, float* vectors) {
+std::vector<bool> Checkpoint::ReadVectors(std::size_t dim, float* vectors) {
   std::vector<bool> found(images_.size());
   Try([&] { found = file_->ReadVectors(images_, dim, vectors); });
   return found;
 }
 
-void RunState::KeepVectors(const std::vector<std::size_t>& which, std::size_t dim,
-                           const float* vectors) {
+void Checkpoint::KeepVectors(const std::vector<std::size_t>& which, std::size_t dim,
+                             const float* vectors) {
   std::vector<ImageFingerprint> images;
   images.reserve(which.size());
   for (const std::size_t i : which) images.push_back(images_[i]);
@@ -119,7 +121,7 @@ void RunState::KeepVectors(const std::vector<std::size_t>& which, std::size_t di
   });
 }
 
-std::string RunState::SeedsKey(const std::string& loop_key) const {
+std::string Checkpoint::SeedsKey(const std::string& loop_key) const {
   boost::crc_32_type crc;
   for (const ImageFingerprint& image : images_) {
     crc.process_bytes(&image.id, sizeof(image.id));
@@ -129,12 +131,12 @@ std::string RunState::SeedsKey(const std::string& loop_key) const {
          std::to_string(images_.size()) + " " + std::to_string(crc.checksum());
 }
 
-std::vector<ImagePair> RunState::ReadSeeds(const std::string& loop_key) {
+std::vector<ImagePair> Checkpoint::ReadSeeds(const std::string& loop_key) {
   Try([&] { kept_seeds_ = file_->ReadSeeds(SeedsKey(loop_key)); });
   return kept_seeds_.value_or(std::vector<ImagePair>());
 }
 
-void RunState::KeepSeeds(const std::string& loop_key, const std::vector<ImagePair>& seeds) {
+void Checkpoint::KeepSeeds(const std::string& loop_key, const std::vector<ImagePair>& seeds) {
   if (kept_seeds_ == seeds) return;
   Try([&] { file_->WriteSeeds(SeedsKey(loop_key), seeds); });
 }

@@ -1,0 +1,102 @@
+#include "colmap_graphmatch/pipeline/run_verification.h"
+
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+#include "colmap_graphmatch/files/finished_graph.h"
+#include "colmap_graphmatch/files/text_file.h"
+#include "colmap_graphmatch/matching/top_two.h"
+#include "colmap_graphmatch/verification/batch_verifier.h"
+#include "colmap_graphmatch/verification/colmap_installation.h"
+#include "colmap_graphmatch/verification/colmap_verifier.h"
+#include "colmap_graphmatch/verification/replay_verifier.h"
+#include "colmap_graphmatch/verification/work_directory.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+class ByColmap : public RunVerification {
+ public:
+  explicit ByColmap(RunSetup& setup)
+      : database_(*setup.database),
+        work_(setup.options.work_path, WorkDirectory::Guard::kGuarded),
+        colmap_(DetectColmap(setup.options.colmap_path, work_.Path(), setup.stop)),
+        plan_(PlanVerification(setup.options.verification, setup.options.num_threads, colmap_)),
+        geometry_(setup.options.verification, plan_, colmap_, database_.Path(), setup.images,
+                  work_.Path(), setup.stop, setup.messages.warn),
+        verifier_(setup.options.verification, plan_, geometry_, database_, setup.images, setup.stop,
+                  setup.messages.warn) {
+    setup.messages.info(
+        std::string("Descriptors are matched ") +
+        (plan_.matches_here ? std::string("exactly, with ") + TopTwoTarget() + "." : "by COLMAP."));
+    setup.messages.info("COLMAP " + colmap_.Version() + " at " + colmap_.executable.string() +
+                        ", " + (plan_.uses_gpu ? "GPU" : "CPU") +
+                        ", processes: " + std::to_string(plan_.num_processes) +
+                        ", threads in each: " + std::to_string(plan_.threads_per_process) + ".");
+  }
+
+  PairVerifier& Verifier() override { return verifier_; }
+
+  std::variant<VerificationCost, ReplayCost> Cost() const override {
+    const MatchingStatistics matching = verifier_.Statistics();
+    const ColmapVerifier::Statistics colmap = geometry_.SoFar();
+    VerificationCost cost;
+    cost.matching_seconds = matching.seconds;
+    cost.num_matched = matching.num_matched;
+    cost.num_image_reads = matching.num_image_reads;
+    cost.colmap_seconds = colmap.seconds;
+    cost.num_verified = colmap.num_verified;
+    cost.num_failed = matching.num_failed;
+    return cost;
+  }
+
+  void Finish() override { database_.CheckInPlace(); }
+
+ private:
+  Database& database_;
+  WorkDirectory work_;
+  ColmapInstallation colmap_;
+  VerificationPlan plan_;
+  ColmapVerifier geometry_;
+  BatchVerifier verifier_;
+};
+
+class ByReplay : public RunVerification {
+ public:
+  ByReplay(RunSetup& setup, FinishedGraph graph) : verifier_(std::move(graph.pairs)) {
+    std::unordered_map<ImageId, std::size_t> num_features;
+    for (const ImageRecord& image : setup.images) num_features[image.id] = image.num_features;
+    verifier_.SetStop(&setup.stop);
+    verifier_.SetCosts(std::move(num_features), setup.threads.NumThreads());
+  }
+
+  PairVerifier& Verifier() override { return verifier_; }
+  std::optional<double> ModelledSeconds() const override { return verifier_.ModelledSeconds(); }
+  std::variant<VerificationCost, ReplayCost> Cost() const override {
+    return ReplayCost{verifier_.ModelledSeconds()};
+  }
+
+ private:
+  ReplayVerifier verifier_;
+};
+
+std::unique_ptr<RunVerification> MakeReplay(RunSetup& setup) {
+  const std::filesystem::path& path = setup.options.replay_path;
+  FinishedGraph graph = ReadFinishedGraph(
+      path, setup.images, setup.options.verification.min_num_inliers, setup.Patience());
+  WarnOfSkippedLines(graph, path, "two different images", setup.messages);
+  setup.messages.info("Replays the matching graph of " + path.string() + ", with " +
+                      std::to_string(graph.num_edges) +
+                      " edges: nothing is matched, and nothing is written to the database.");
+  return std::make_unique<ByReplay>(setup, std::move(graph));
+}
+
+}  // namespace
+
+std::unique_ptr<RunVerification> MakeRunVerification(RunSetup& setup) {
+  if (!setup.options.replay_path.empty()) return MakeReplay(setup);
+  return std::make_unique<ByColmap>(setup);
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "colmap_graphmatch/base/messages.h"
+#include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/stop_request.h"
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/ranking/ranking.h"
+#include "colmap_graphmatch/vectors/checkpoint.h"
+#include "colmap_graphmatch/vectors/options.h"
+#include "colmap_graphmatch/vectors/vector_model.h"
+
+namespace colmap_graphmatch {
+
+// For messages, e.g. "Fisher vectors".
+const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor);
+
+// The images that have a vector, ascending by id, and a row of dim floats for each.
+struct ImageVectors {
+  std::vector<ImageRecord> images;
+  std::size_t dim = 0;
+  std::vector<float> rows;
+};
+
+struct RankedImages {
+  std::vector<ImageRecord> images;   // Those that are ranked, ascending by id,
+  std::unique_ptr<Ranking> ranking;  // and their ranking: a vertex each.
+};
+
+// From the features to ranked lists, in three steps: the pre-processing of the paper. What an
+// earlier run kept is used, and kept for the next. A step that the options make needless, as where
+// vectors or ranked lists are given, does nothing.
+class ImageRanker {
+ public:
+  // images: all with features, and their fingerprints. seed: of everything random. All that is
+  // passed by reference must outlive it.
+  ImageRanker(const ImageRankingOptions& options, std::uint64_t seed, Database& database,
+              const std::vector<ImageRecord>& images,
+              const std::vector<ImageFingerprint>& fingerprints, Checkpoint& checkpoint,
+              ThreadPool& threads, const StopRequest& stop, const Messages& messages);
+
+  // What images are described with. known: the pairs that are in the database, of which a warning
+  // may speak.
+  VectorModel Learn(const std::vector<VerifiedPair>& known);
+
+  ImageVectors Encode(const VectorModel& model);
+
+  RankedImages Rank(ImageVectors vectors);
+
+  // What the steps took.
+  const ImageRankingSeconds& Seconds() const { return seconds_; }
+
+ private:
+  bool AreListsGiven() const { return !options_.ranking_path.empty(); }
+  bool AreVectorsGiven() const;
+
+  void SelectKept(const std::vector<VerifiedPair>& known);
+  VectorModel FindModel();
+  std::vector<float> FindVectors(const VectorModel& model);
+  ImageVectors ReadVectors();
+  RankedImages ReadLists();
+  void Export(const ImageVectors& vectors) const;
+
+  const ImageRankingOptions& options_;
+  std::uint64_t seed_;
+  Database& database_;
+  const std::vector<ImageRecord>& images_;
+  const std::vector<ImageFingerprint>& fingerprints_;
+  Checkpoint& checkpoint_;
+  ThreadPool& threads_;
+  const StopRequest& stop_;
+  const Messages& messages_;
+  ImageRankingSeconds seconds_;
+};
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,61 @@
+#include "colmap_graphmatch/vectors/options.h"
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/types.h"
+
+namespace colmap_graphmatch {
+
+void ImageVectorOptions::Check() const {
+  gmm.Check();
+  if (pca_dim < 0 || pca_dim > kDescriptorDim) {
+    throw OptionsError("pca_dim is " + std::to_string(pca_dim) +
+                       "; it must be at most 128, or 0 for no PCA.");
+  }
+  if (descriptor == Descriptor::kGist && image_path.empty()) {
+    throw OptionsError("GIST describes the photos themselves: give --image_path, where they are.");
+  }
+  if ((descriptor == Descriptor::kFile) != !vectors_path.empty()) {
+    throw OptionsError(
+        "--GraphMatching.descriptor file and --GraphMatching.vectors_path belong together: give "
+        "both or none.");
+  }
+  if (num_training_descriptors < 1) {
+    throw OptionsError("num_training_descriptors is " + std::to_string(num_training_descriptors) +
+                       "; the mixture needs at least 1.");
+  }
+  if (max_num_features < 1) {
+    throw OptionsError("max_num_features is " + std::to_string(max_num_features) +
+                       "; an image vector needs at least 1.");
+  }
+}
+
+std::string ImageVectorOptions::Key(std::uint64_t seed) const {
+  // Does not compile if a field is forgotten.
+  const auto& [described_by, photos, vectors, dim, mixture, num_training, num_features] = *this;
+  // The seed is there twice, as in the state files that there are.
+  return "descriptor " + std::to_string(static_cast<int>(described_by)) + ", PCA " +
+         std::to_string(dim) + ", " + mixture.Key(seed) + ", training " +
+         std::to_string(num_training) + ", features " + std::to_string(num_features) + ", seed " +
+         std::to_string(seed);
+}
+
+void ImageRankingOptions::Check() const {
+  vectors.Check();
+  const bool given = vectors.descriptor == ImageVectorOptions::Descriptor::kFile;
+  if (!export_path.empty() && export_path.extension() != ".npy") {
+    throw OptionsError("--GraphMatching.export_vectors is " + export_path.string() +
+                       "; its name must end in .npy (the names go beside it, into .txt).");
+  }
+  if (!ranking_path.empty() && vectors.descriptor != ImageVectorOptions::Descriptor::kFisher) {
+    throw OptionsError(
+        "--GraphMatching.ranking_path and --GraphMatching.descriptor contradict each other: give "
+        "one of them.");
+  }
+  if (!export_path.empty() && (given || !ranking_path.empty())) {
+    throw OptionsError(
+        "--GraphMatching.export_vectors writes vectors that this program makes: there are none "
+        "with --GraphMatching.ranking_path or --GraphMatching.vectors_path.");
+  }
+}
+
+}  // namespace colmap_graphmatch

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "colmap_graphmatch/base/enum_words.h"
+#include "colmap_graphmatch/encoding/gmm_options.h"
+
+namespace colmap_graphmatch {
+
+struct ImageVectorOptions {
+  // kFisher: Fisher vectors of SIFT features (encoding/fisher_vector.h). For comparison kVlad: VLAD
+  // under the same mixture (encoding/vlad.h), kGist: GIST of the photos (encoding/gist.h), kFile:
+  // vectors that another program made (files/given_vectors.h).
+  enum class Descriptor { kFisher, kVlad, kGist, kFile };
+  Descriptor descriptor = Descriptor::kFisher;
+
+  // Where the photos are, for kGist.
+  std::filesystem::path image_path;
+
+  // Where the vectors are, for kFile.
+  std::filesystem::path vectors_path;
+
+  // PCA of the features to so many dimensions before the mixture, at most 128; 0: none. The paper
+  // has none, and 16 components: with as many entries a vector, 64 components in 32 dimensions find
+  // more edges in as many tests (docs/evaluation.md).
+  int pca_dim = 32;
+
+  GmmOptions gmm;
+
+  // Descriptors that the mixture is learnt from, the same number from every image (at least one,
+  // all if it has fewer), drawn at random. More cost proportionally more time and 512 bytes each.
+  int num_training_descriptors = 100000;
+
+  // Descriptors an image that are encoded at most: those of the largest scales. Paper: 1,000.
+  int max_num_features = 1000;
+
+  // Names the seed and the values of all fields but the paths: their contents count, not where they
+  // are.
+  std::string Key(std::uint64_t seed) const;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+inline constexpr EnumWords<ImageVectorOptions::Descriptor, 4> kDescriptorWords = {
+    {{ImageVectorOptions::Descriptor::kFisher, "fisher"},
+     {ImageVectorOptions::Descriptor::kVlad, "vlad"},
+     {ImageVectorOptions::Descriptor::kGist, "gist"},
+     {ImageVectorOptions::Descriptor::kFile, "file"}}};
+
+struct ImageRankingOptions {
+  ImageVectorOptions vectors;
+
+  // Writes the vectors that are made to this file (encoding/numpy_file.h), unless it is empty.
+  std::filesystem::path export_path;
+
+  // Takes the ranked lists from this file (files/ranked_lists.h) instead of making vectors, unless
+  // it is empty.
+  std::filesystem::path ranking_path;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
+// What the steps of ranking took; 0 for one that there was no need of.
+struct ImageRankingSeconds {
+  double mixture = 0;
+  double vectors = 0;
+  double ranking = 0;
+
+  double Sum() const { return mixture + vectors + ranking; }
+};
+
+}  // namespace colmap_graphmatch
