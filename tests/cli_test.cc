@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <fstream>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,31 @@ TEST(OptionTable, EveryRowTakesItsDefaultAndRefusesWhatItMustNotBe) {
       EXPECT_FALSE(row.read(text)) << row.name << " \"" << text << "\"";
     }
   }
+}
+
+TEST(Help, ShowsTheTenThatAreUsedMostOnOneScreenAndAllOnDemand) {
+  std::ostringstream common;
+  PrintHelp(common);
+  std::ostringstream all;
+  PrintFullHelp(all);
+  EXPECT_THAT(common.str(), HasSubstr("--help-all"));
+  CommandLine line;
+  int count = 0;
+  for (const OptionRow& row : MakeOptionTable(&line)) {
+    const std::string option = "\n  --" + row.name + " ";
+    EXPECT_EQ(common.str().find(option) != std::string::npos, row.is_common) << row.name;
+    const bool has_effect = row.use != OptionRow::Use::kUnused && row.name != "help";
+    EXPECT_EQ(all.str().find(option) != std::string::npos, has_effect) << row.name;
+    count += row.is_common ? 1 : 0;
+  }
+  EXPECT_EQ(count, 10);
+}
+
+TEST(Help, IsAskedForUnderThreeNames) {
+  EXPECT_TRUE(Parse({"-h"}).help);
+  EXPECT_TRUE(Parse({"--help"}).help);
+  EXPECT_FALSE(Parse({"--help"}).help_all);
+  EXPECT_TRUE(Parse({"--help-all"}).help_all);
 }
 
 // What shells complete.

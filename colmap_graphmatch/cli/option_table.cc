@@ -141,16 +141,20 @@ class Table {
 void Table::AddGeneral() {
   PipelineOptions& p = line_->pipeline;
   Section("General");
-  Add("help", Flag(&line_->help), "print this help").names.emplace_back("h");
+  Add("help", Flag(&line_->help), "print an example and the options that are used most")
+      .names.emplace_back("h");
+  Add("help-all", Flag(&line_->help_all), "print all options");
   Add("version", Flag(&line_->version), "print the version");
   AddColmap(Use::kHere, {{{3, 8}, "database_path", ""}},
             TextOf(&p.database_path, "the path of a COLMAP database"),
-            "the COLMAP database with the features; the matches are written to it");
+            "the COLMAP database with the features; the matches are written to it")
+      .is_common = true;
   AddColmap(Use::kHere, {{{3, 8}, "project_path", ""}},
             TextOf(&line_->project_path, "the path of a file"),
             "an ini file with options, as COLMAP writes it; the command line goes before");
   Add("colmap_path", TextOf(&p.colmap_path, "a path, or a name on PATH", OptionRow::Path::kProgram),
-      "the COLMAP program: a path, or a name on PATH");
+      "the COLMAP program: a path, or a name on PATH")
+      .is_common = true;
   AddColmap(
       Use::kHere, {{{3, 8}, "random_seed", "0"}, {{3, 13}, "default_random_seed", "0"}},
       SeedOf(&p.seed, &line_->seed_from_clock),
@@ -164,10 +168,11 @@ void Table::AddGraph() {
   Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategyWords),
       "which pairs are tested: those that graphmatch finds; for comparison sampling or propagation "
       "(after one sampling) alone, retrieval: the nearest images of each, briad: retrieval and "
-      "query "
-      "expansion; exhaustive: all");
+      "query expansion; exhaustive: all")
+      .is_common = true;
   Add("GraphMatching.match_list_path", TextOf(&p.match_list_path, "the path of a list of pairs"),
-      "a file of image pairs to be tested instead, two names a line");
+      "a file of image pairs to be tested instead, two names a line")
+      .is_common = true;
   AddColmap(Use::kHere, {{{3, 8}, "VocabTreeMatching.match_list_path", ""}},
             // COLMAP's default is an empty one.
             TextOrNothingOf(&p.image_list_path, "the path of a list of images"),
@@ -176,8 +181,8 @@ void Table::AddGraph() {
       "iterations (>= 0) that sample before propagating; later ones only propagate");
   Add("GraphMatching.max_tests_for_sampling", IntOf(&p.graph.max_tests_for_sampling, 0),
       "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N "
-      "images. "
-      "More finds weaker links and costs up to N tests for each");
+      "images. More finds weaker links and costs up to N tests for each")
+      .is_common = true;
   OptionRow& neighbors =
       Add("GraphMatching.max_num_neighbors", IntOf(&p.graph.max_num_neighbors, 1),
           "neighbours (>= 1) after which an image looks for no more itself. Fewer thins dense "
@@ -193,7 +198,8 @@ void Table::AddGraph() {
       "goes on; 0: no limit");
   Add("GraphMatching.max_minutes", DoubleOf(&p.budget.max_minutes, Zero::kAllowed),
       "minutes (>= 0) after which no pair is tested any more, counted from the start; ranking the "
-      "images is not cut short; 0: no limit");
+      "images is not cut short; 0: no limit")
+      .is_common = true;
   Add("GraphMatching.dry_run", BoolOf(&p.dry_run),
       "only rank the images: the first candidates are counted, and written by export_pairs; "
       "nothing "
@@ -216,7 +222,8 @@ void Table::AddVectors() {
       "of the photo, or vectors of another program from a file");
   Add("image_path",
       TextOf(&vectors.image_path, "the path of a directory", OptionRow::Path::kDirectory),
-      "the directory of the photos: for the descriptor gist, and to show photos in the report");
+      "the directory of the photos: to show them in the report, and for the descriptor gist")
+      .is_common = true;
   Add("GraphMatching.vectors_path", TextOf(&vectors.vectors_path, "the path of a .npy file"),
       "for the descriptor file: a NumPy array, a row of float32 or float64 for each image; the "
       "images' names are in the file of the same name with .txt instead of .npy, one a line");
@@ -270,9 +277,9 @@ void Table::AddEvaluation() {
   Section("GraphMatch: what a run tells, and how it is compared with others");
   Add("GraphMatching.report", TextOf(&line_->report_path, "the path of a file"),
       "a page (.html, and the same as .json beside it) or a JSON file to write with what was "
-      "found, "
-      "what it cost, and what is wrong with images that match nothing. With --image_path the page "
-      "shows the photos");
+      "found, what it cost, and what is wrong with images that match nothing. With --image_path "
+      "the page shows the photos")
+      .is_common = true;
   Add("GraphMatching.export_pairs", TextOf(&line_->pair_list_path, "the path of a file"),
       "write the edges, those with the most inliers first, as a list of pairs as COLMAP and hloc "
       "read it; in a dry run the candidates, nearest first");
@@ -321,13 +328,15 @@ void Table::AddColmapMatching() {
       "SiftMatching, TwoViewGeometry and FeatureMatching");
   AddGrouped(Use::kHere,
              {{{3, 8}, "SiftMatching.use_gpu", "1"}, {{3, 13}, "FeatureMatching.use_gpu", "1"}},
-             BoolOf(&p.verification.use_gpu), "match on the GPU if the installed COLMAP can");
+             BoolOf(&p.verification.use_gpu), "match on the GPU if the installed COLMAP can")
+      .is_common = true;
   PassText({{{3, 8}, "SiftMatching.gpu_index", "-1"}, {{3, 13}, "FeatureMatching.gpu_index", "-1"}},
            "which GPUs, e.g. 0,1; -1: all");
   AddGrouped(
       Use::kHere,
       {{{3, 8}, "SiftMatching.num_threads", "-1"}, {{3, 13}, "FeatureMatching.num_threads", "-1"}},
-      NumThreadsOf(&p.num_threads), "cores to use at a time, COLMAP's included; below 1: all");
+      NumThreadsOf(&p.num_threads), "cores to use at a time, COLMAP's included; below 1: all")
+      .is_common = true;
   AddGrouped(Use::kHere,
              {{{3, 13}, "FeatureMatching.type", "SIFT"},
               {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},

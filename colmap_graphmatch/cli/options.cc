@@ -26,7 +26,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-constexpr char kSeeHelp[] = "`graphmatch_matcher -h` lists the options.";
+constexpr char kSeeHelp[] = "`graphmatch_matcher --help-all` lists the options.";
 
 std::string WithoutGroup(const std::string& name) { return name.substr(name.find('.') + 1); }
 
@@ -103,11 +103,12 @@ class Parser {
 
   void Parse(int argc, const char* const* argv) {
     ReadArguments(argc, argv);
-    if (line_->help || line_->version) return;
+    if (line_->help || line_->help_all || line_->version) return;
     if (!line_->project_path.empty()) ReadProject();
     if (line_->pipeline.database_path.empty()) {
-      throw OptionsError("--database_path is missing: the COLMAP database with the features. " +
-                         std::string(kSeeHelp));
+      throw OptionsError(
+          "--database_path is missing: the COLMAP database with the features. `graphmatch_matcher "
+          "-h` has an example.");
     }
     PipelineOptions& p = line_->pipeline;
     if (line_->lightglue) {
