@@ -397,9 +397,12 @@ Statement& Statement::Bind(int parameter, std::string_view text) {
 }
 
 Statement& Statement::Bind(int parameter, const Blob& blob) {
-  if (blob.empty()) return BindNull(parameter);
-  return CheckBind(
-      sqlite3_bind_blob64(statement_.get(), parameter, blob.data(), blob.size(), SQLITE_STATIC));
+  return BindBytes(parameter, blob.data(), blob.size());
+}
+
+Statement& Statement::BindBytes(int parameter, const void* data, std::size_t size) {
+  if (size == 0) return BindNull(parameter);
+  return CheckBind(sqlite3_bind_blob64(statement_.get(), parameter, data, size, SQLITE_STATIC));
 }
 
 Statement& Statement::BindNull(int parameter) {
