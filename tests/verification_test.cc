@@ -290,7 +290,7 @@ TEST_F(VerifierTest, OptionsAreSpeltAsTheInstalledColmapSpellsThem) {
                                     HasSubstr("--FeatureMatching.num_threads=1"),
                                     HasSubstr("--FeatureMatching.min_num_inliers=18"))));
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("COLMAP 4.2.1 does not have these options, which "
-                                               "have no effect: SiftMatching.max_error.")));
+                                               "have no effect: TwoViewGeometry.max_error.")));
 }
 
 TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {
