@@ -137,12 +137,11 @@ TEST(Options, EverySpellingOfAnOptionMeansTheSame) {
     const CommandLine line =
         Parse({prefix + ".max_error", "3", prefix + ".max_ratio", "0.7", prefix + ".num_threads",
                "2", prefix + ".use_gpu", "false", prefix + ".min_num_inliers", "20"});
-    EXPECT_THAT(line.pipeline.verification.colmap_options,
-                ElementsAre(Pair("TwoViewGeometry.max_error", "3")));
+    EXPECT_EQ(line.pipeline.verification.geometry.max_error, 3);
     EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
     EXPECT_EQ(line.pipeline.num_threads, 2);
     EXPECT_FALSE(line.pipeline.verification.use_gpu);
-    EXPECT_EQ(line.pipeline.verification.min_num_inliers, 20);
+    EXPECT_EQ(line.pipeline.verification.geometry.min_num_inliers, 20);
   }
 }
 
@@ -516,14 +515,12 @@ TEST_F(ProjectTest, TheCommandLineGoesBeforeInAnySpelling) {
       "[SiftMatching]\nmax_error=3\nmax_ratio=0.7\n[VocabTreeMatching]\nnum_images=30\n"
       "vocab_tree_path=\n[Mapper]\nmin_num_matches=x\n");
   CommandLine line = Parse(arguments);
-  EXPECT_THAT(line.pipeline.verification.colmap_options,
-              ElementsAre(Pair("TwoViewGeometry.max_error", "3")));
+  EXPECT_EQ(line.pipeline.verification.geometry.max_error, 3);
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 30);
   arguments.insert(arguments.end(),
                    {"--TwoViewGeometry.max_error", "5", "--GraphMatching.max_num_neighbors", "40"});
   line = Parse(arguments);
-  EXPECT_THAT(line.pipeline.verification.colmap_options,
-              ElementsAre(Pair("TwoViewGeometry.max_error", "5")));
+  EXPECT_EQ(line.pipeline.verification.geometry.max_error, 5);
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 40);
   EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
 }

@@ -14,6 +14,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -71,8 +72,9 @@ class VerifierTest : public ::testing::Test {
     const VerificationPlan plan = PlanVerification(options_, colmap);
     ColmapVerifier geometry(options_, colmap, database_path_, images, work.Path(), stop_, warn);
     BatchVerifier verifier(options_, plan, geometry, database, images, stop_, warn);
-    const bool complete = verifier.Verify(pairs, [this](const VerifiedPair& pair) {
+    const bool complete = verifier.Verify(pairs, [&](const VerifiedPair& pair) {
       EXPECT_TRUE(outcomes_.emplace(pair.pair, pair.outcome).second);
+      inliers_[pair.pair] = verifier.Inliers(pair.pair);
     });
     statistics_ = verifier.Statistics();
     matched_here_ = plan.matches_here;
@@ -87,6 +89,8 @@ class VerifierTest : public ::testing::Test {
     }
     return names;
   }
+
+  std::map<ImagePair, FeatureMatches> inliers_;  // Of what was reported last.
 
   std::set<ImagePair> InDatabase() const {
     Database database(database_path_, sqlite::Access::kRead, 5);
@@ -139,6 +143,20 @@ TEST_F(VerifierTest, VerifiesEveryPairAndWritesItToTheDatabase) {
   EXPECT_EQ(InDatabase(), std::set<ImagePair>(pairs.begin(), pairs.end()));
   EXPECT_EQ(CountInLog("pair"), 300U);
   EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(VerifierTest, InliersAreReportedAndThoseOfKnownPairsRead) {
+  EXPECT_TRUE(Verify(AllPairs(12)));
+  for (const auto& [pair, inliers] : inliers_) {
+    EXPECT_THAT(inliers, SizeIs(IsFakeEdge(pair) ? 20 : 0));
+  }
+  EXPECT_EQ(inliers_.at(ImagePair(1, 2))[3], (FeatureMatch{3, 3}));
+  const std::map<ImagePair, FeatureMatches> before = std::exchange(inliers_, {});
+  const std::size_t runs = CountInLog("run");
+  outcomes_.clear();
+  EXPECT_TRUE(Verify(AllPairs(12)));
+  EXPECT_EQ(CountInLog("run"), runs);
+  EXPECT_EQ(inliers_, before);
 }
 
 TEST_F(VerifierTest, KnownPairsAreAnsweredWithoutColmap) {
@@ -264,15 +282,15 @@ TEST_F(VerifierTest, OptionsAreSpeltAsTheInstalledColmapSpellsThem) {
   Set("FAKE_COLMAP_SCHEMA", "42");
   Set("FAKE_COLMAP_GROUP", "FeatureMatching");
   options_.exact.matching.max_ratio = 0.7;
-  options_.colmap_options = {{"SiftMatching.max_error", "3"}};
-  options_.min_num_inliers = 18;
+  options_.geometry.max_error = 3;
+  options_.geometry.min_num_inliers = 18;
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("--FeatureMatching.max_ratio=0.7"),
                                     HasSubstr("--FeatureMatching.use_gpu=0"),
                                     HasSubstr("--FeatureMatching.num_threads=1"),
                                     HasSubstr("--FeatureMatching.min_num_inliers=18"))));
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("COLMAP 4.2.1 does not have these options, which "
-                                               "have no effect: SiftMatching.max_error.")));
+                                               "have no effect: TwoViewGeometry.max_error.")));
 }
 
 TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {
@@ -287,7 +305,7 @@ TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {
 }
 
 TEST_F(VerifierTest, EdgesFollowMinNumInliers) {
-  options_.min_num_inliers = 21;  // The test double finds 20.
+  options_.geometry.min_num_inliers = 21;  // The test double finds 20.
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kNoEdge);
 }
@@ -435,7 +453,7 @@ TEST_F(ExactMatcherTest, ColmapGetsManyPairsAtATimeThoughFewHaveMatches) {
 }
 
 TEST_F(ExactMatcherTest, GuidedMatchingNeedsDescriptors) {
-  options_.colmap_options = {{"guided_matching", "1"}};
+  options_.geometry.guided_matching = true;
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_THAT(Log(), Contains("descriptors of 2 images"));
 }
@@ -597,14 +615,16 @@ class FailingOn : public GeometryVerifier {
     ShardOutcome outcome;
     for (const ShardPair& pair : pairs) {
       if (guilty_.count(pair.pair) > 0 && times_ > 0) outcome.problem = "failed";
-      PairRows rows;
-      rows.pair = pair.pair;
-      outcome.results.push_back(rows);
+      PairGeometry result;
+      result.pair = pair.pair;
+      outcome.results.push_back(result);
     }
     if (!outcome.problem.empty()) --times_;
     return outcome;
   }
-  int ConfigOfUnmatched() const override { return 0; }
+  TwoViewConfiguration ConfigurationOfUnmatched() const override {
+    return TwoViewConfiguration::kUndefined;
+  }
 
   std::vector<std::size_t> sizes;
 
@@ -616,7 +636,7 @@ class FailingOn : public GeometryVerifier {
 class KeepingProgress : public ShardRunner::Progress {
  public:
   void Finish(ShardPart part) override {
-    for (const PairRows& rows : part.results) verified.insert(rows.pair);
+    for (const PairGeometry& result : part.results) verified.insert(result.pair);
     for (const ShardPart::Failure& failure : part.failures) failed.insert(failure.first);
   }
   bool GivesUp() const override { return gives_up; }

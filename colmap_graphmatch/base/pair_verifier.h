@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "colmap_graphmatch/base/two_view_geometry.h"
 #include "colmap_graphmatch/base/types.h"
 
 namespace colmap_graphmatch {
@@ -42,6 +43,11 @@ class PairVerifier {
   // that stays valid too.
   virtual bool Verify(const std::vector<ImagePair>& pairs,
                       const std::function<void(const VerifiedPair&)>& on_verified) = 0;
+
+  // The inlier matches of a known pair, or of the one that on_verified is being told of. Empty for
+  // pairs without any, and if the verifier does not know them (a replay of a list of edges). Valid
+  // until the next call of a member. Throws DatabaseError.
+  virtual const FeatureMatches& Inliers(const ImagePair& pair) = 0;
 };
 
 // The entry of a pair in an ascending list, or null.

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "colmap_graphmatch/cli/option_values.h"
@@ -86,36 +88,32 @@ class Table {
   OptionRow& PassOn(std::vector<ColmapSpelling> colmap, CheckedText text, const std::string& help) {
     const std::string& name = colmap.back().name.empty() ? colmap.front().name : colmap.back().name;
     std::map<std::string, std::string>* options = &line_->pipeline.verification.colmap_options;
+    return PassOn(
+        std::move(colmap), std::move(text),
+        [options, key = name](const std::string& checked) { (*options)[key] = checked; }, help);
+  }
+
+  // It is stored in a field, from which COLMAP gets it if it is set.
+  template <typename T>
+  OptionRow& PassOn(std::vector<ColmapSpelling> colmap, CheckedText text, std::optional<T>* field,
+                    const std::string& help) {
+    return PassOn(
+        std::move(colmap), std::move(text),
+        [field](const std::string& checked) { Store(checked, field); }, help);
+  }
+
+  OptionRow& PassOn(std::vector<ColmapSpelling> colmap, CheckedText text,
+                    const std::function<void(const std::string&)>& store, const std::string& help) {
     Value value;
     value.values = std::move(text.values);
     value.choices = std::move(text.choices);
-    value.read = [options, key = name, check = std::move(text.check)](const std::string& given) {
+    value.read = [store, check = std::move(text.check)](const std::string& given) {
       std::string checked = given;
       if (!check(&checked)) return false;
-      (*options)[key] = checked;
+      store(checked);
       return true;
     };
     return AddGrouped(Use::kPassedOn, std::move(colmap), std::move(value), help);
-  }
-
-  OptionRow& PassBool(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), BoolText(), help);
-  }
-
-  OptionRow& PassInt(std::vector<ColmapSpelling> colmap, int minimum, const std::string& help) {
-    return PassOn(std::move(colmap), IntText(minimum), help);
-  }
-
-  OptionRow& PassShare(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), ShareText(), help);
-  }
-
-  OptionRow& PassPixels(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), PositiveText(), help);
-  }
-
-  OptionRow& PassText(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), AnyText(), help);
   }
 
   void AddUnused(std::vector<ColmapSpelling> colmap, const std::string& why) {
@@ -323,6 +321,7 @@ void Table::AddLog() {
 void Table::AddColmapMatching() {
   PipelineOptions& p = line_->pipeline;
   DescriptorMatchingOptions& matching = p.verification.exact.matching;
+  GeometryOptions& geometry = p.verification.geometry;
   Section(
       "COLMAP's options of matching and verification, accepted in each of the groups "
       "SiftMatching, TwoViewGeometry and FeatureMatching");
@@ -330,8 +329,8 @@ void Table::AddColmapMatching() {
              {{{3, 8}, "SiftMatching.use_gpu", "1"}, {{3, 13}, "FeatureMatching.use_gpu", "1"}},
              BoolOf(&p.verification.use_gpu), "match on the GPU if the installed COLMAP can")
       .is_common = true;
-  PassText({{{3, 8}, "SiftMatching.gpu_index", "-1"}, {{3, 13}, "FeatureMatching.gpu_index", "-1"}},
-           "which GPUs, e.g. 0,1; -1: all");
+  PassOn({{{3, 8}, "SiftMatching.gpu_index", "-1"}, {{3, 13}, "FeatureMatching.gpu_index", "-1"}},
+         AnyText(), "which GPUs, e.g. 0,1; -1: all");
   AddGrouped(
       Use::kHere,
       {{{3, 8}, "SiftMatching.num_threads", "-1"}, {{3, 13}, "FeatureMatching.num_threads", "-1"}},
@@ -354,54 +353,61 @@ void Table::AddColmapMatching() {
              {{{3, 8}, "SiftMatching.max_num_matches", "32768"},
               {{3, 13}, "FeatureMatching.max_num_matches", "32768"}},
              IntOf(&matching.max_num_matches, 1), "features of an image that are matched at most");
-  PassBool({{{3, 8}, "SiftMatching.guided_matching", "0"},
-            {{3, 13}, "FeatureMatching.guided_matching", "0"}},
-           "match again along the epipolar geometry that was found");
+  PassOn({{{3, 8}, "SiftMatching.guided_matching", "0"},
+          {{3, 13}, "FeatureMatching.guided_matching", "0"}},
+         BoolText(), &geometry.guided_matching,
+         "match again along the epipolar geometry that was found");
   AddGrouped(Use::kHere,
              {{{3, 8}, "SiftMatching.min_num_inliers", "15"},
               {{3, 9}, "TwoViewGeometry.min_num_inliers", "15"}},
-             IntOf(&p.verification.min_num_inliers, 0), "inliers that make a pair an edge");
-  PassPixels({{{3, 8}, "SiftMatching.max_error", "4"}, {{3, 9}, "TwoViewGeometry.max_error", "4"}},
-             "greatest epipolar error of an inlier, in pixels");
-  PassShare({{{3, 8}, "SiftMatching.confidence", "0.999"},
-             {{3, 9}, "TwoViewGeometry.confidence", "0.999"}},
-            "confidence of RANSAC");
-  PassInt({{{3, 8}, "SiftMatching.max_num_trials", "10000"},
-           {{3, 9}, "TwoViewGeometry.max_num_trials", "10000"}},
-          30, "trials of RANSAC at most");
-  PassShare({{{3, 8}, "SiftMatching.min_inlier_ratio", "0.25"},
-             {{3, 9}, "TwoViewGeometry.min_inlier_ratio", "0.25"},
-             {{4, 2}, "TwoViewGeometry.min_inlier_ratio", "0"}},
-            "inlier ratio that RANSAC counts on");
-  PassBool({{{3, 8}, "SiftMatching.multiple_models", "0"},
-            {{3, 9}, "TwoViewGeometry.multiple_models", "0"}},
-           "look for several motions in a pair");
-  PassBool({{{3, 8}, "SiftMatching.compute_relative_pose", "0"},
-            {{3, 9}, "TwoViewGeometry.compute_relative_pose", "0"}},
-           "store the relative pose as well");
-  PassBool({{{3, 8}, "SiftMatching.planar_scene", "0"}, {{3, 9}, "", ""}}, "the scene is planar");
-  PassBool({{{3, 12}, "SiftMatching.cpu_brute_force_matcher", "0"}},
-           "match exactly where COLMAP matches without a GPU; much slower");
-  PassBool({{{3, 13}, "TwoViewGeometry.detect_watermark", "1"}},
-           "mark pairs that only a watermark links");
-  PassBool({{{3, 13}, "TwoViewGeometry.multiple_ignore_watermark", "1"}},
-           "leave watermarks out of several motions");
-  PassPixels({{{3, 13}, "TwoViewGeometry.watermark_detection_max_error", "4"}},
-             "greatest error of a watermark's inlier, in pixels");
-  PassBool({{{3, 13}, "TwoViewGeometry.filter_stationary_matches", "0"}},
-           "drop matches at the same place in both images");
-  PassPixels({{{3, 13}, "TwoViewGeometry.stationary_matches_max_error", "4"}},
-             "what the same place means, in pixels");
-  PassInt({{{3, 13}, "TwoViewGeometry.random_seed", "-1"}}, -1,
-          "seed of RANSAC, the same for every pair; -1: of the thread");
-  PassBool({{{4, 2}, "TwoViewGeometry.use_degensac", "0"}}, "use DEGENSAC");
-  PassBool({{{4, 2}, "TwoViewGeometry.use_sampson_refinement", "1"}}, "refine by Sampson errors");
+             IntOf(&p.verification.geometry.min_num_inliers, 0),
+             "inliers that make a pair an edge");
+  PassOn({{{3, 8}, "SiftMatching.max_error", "4"}, {{3, 9}, "TwoViewGeometry.max_error", "4"}},
+         PositiveText(), &geometry.max_error, "greatest epipolar error of an inlier, in pixels");
+  PassOn({{{3, 8}, "SiftMatching.confidence", "0.999"},
+          {{3, 9}, "TwoViewGeometry.confidence", "0.999"}},
+         ShareText(), &geometry.confidence, "confidence of RANSAC");
+  PassOn({{{3, 8}, "SiftMatching.max_num_trials", "10000"},
+          {{3, 9}, "TwoViewGeometry.max_num_trials", "10000"}},
+         IntText(30), &geometry.max_num_trials, "trials of RANSAC at most");
+  PassOn({{{3, 8}, "SiftMatching.min_inlier_ratio", "0.25"},
+          {{3, 9}, "TwoViewGeometry.min_inlier_ratio", "0.25"},
+          {{4, 2}, "TwoViewGeometry.min_inlier_ratio", "0"}},
+         ShareText(), &geometry.min_inlier_ratio, "inlier ratio that RANSAC counts on");
+  PassOn({{{3, 8}, "SiftMatching.multiple_models", "0"},
+          {{3, 9}, "TwoViewGeometry.multiple_models", "0"}},
+         BoolText(), &geometry.multiple_models, "look for several motions in a pair");
+  PassOn({{{3, 8}, "SiftMatching.compute_relative_pose", "0"},
+          {{3, 9}, "TwoViewGeometry.compute_relative_pose", "0"}},
+         BoolText(), &geometry.compute_relative_pose, "store the relative pose as well");
+  PassOn({{{3, 8}, "SiftMatching.planar_scene", "0"}, {{3, 9}, "", ""}}, BoolText(),
+         &geometry.planar_scene, "the scene is planar");
+  PassOn({{{3, 12}, "SiftMatching.cpu_brute_force_matcher", "0"}}, BoolText(),
+         "match exactly where COLMAP matches without a GPU; much slower");
+  PassOn({{{3, 13}, "TwoViewGeometry.detect_watermark", "1"}}, BoolText(),
+         &geometry.detect_watermark, "mark pairs that only a watermark links");
+  PassOn({{{3, 13}, "TwoViewGeometry.multiple_ignore_watermark", "1"}}, BoolText(),
+         &geometry.multiple_ignore_watermark, "leave watermarks out of several motions");
+  PassOn({{{3, 13}, "TwoViewGeometry.watermark_detection_max_error", "4"}}, PositiveText(),
+         &geometry.watermark_detection_max_error,
+         "greatest error of a watermark's inlier, in pixels");
+  PassOn({{{3, 13}, "TwoViewGeometry.filter_stationary_matches", "0"}}, BoolText(),
+         &geometry.filter_stationary_matches, "drop matches at the same place in both images");
+  PassOn({{{3, 13}, "TwoViewGeometry.stationary_matches_max_error", "4"}}, PositiveText(),
+         &geometry.stationary_matches_max_error, "what the same place means, in pixels");
+  PassOn({{{3, 13}, "TwoViewGeometry.random_seed", "-1"}}, IntText(-1), &geometry.random_seed,
+         "seed of RANSAC, the same for every pair; -1: of the thread");
+  PassOn({{{4, 2}, "TwoViewGeometry.use_degensac", "0"}}, BoolText(), &geometry.use_degensac,
+         "use DEGENSAC");
+  PassOn({{{4, 2}, "TwoViewGeometry.use_sampson_refinement", "1"}}, BoolText(),
+         &geometry.use_sampson_refinement, "refine by Sampson errors");
   AddGrouped(Use::kHere, {{{4, 0}, "FeatureMatching.skip_image_pairs_in_same_frame", "0"}},
              BoolOf(&p.skip_image_pairs_in_same_frame),
              "do not test pairs of images that a rig took at the same time");
-  PassShare({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, "score of a match by LightGlue");
-  PassText({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, "the model of LightGlue").path =
-      OptionRow::Path::kFile;
+  PassOn({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, ShareText(),
+         "score of a match by LightGlue");
+  PassOn({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, AnyText(), "the model of LightGlue")
+      .path = OptionRow::Path::kFile;
 }
 
 void Table::AddUnusedOptions() {

@@ -100,7 +100,7 @@ class Pipeline {
   std::unique_ptr<PairProposer> MakeProposer(const std::vector<ImageId>& ids,
                                              const PairRestrictions& restrictions);
   KnownPairsPolicy ChooseKnown(const std::vector<ImageId>& ids,
-                               const PairRestrictions& restrictions, const PairVerifier& verifier);
+                               const PairRestrictions& restrictions, PairVerifier& verifier);
   BudgetedVerifier::Order OrderOfTests(const std::vector<ImageId>& ids) const;
   void OnProgress(const LoopProgress& progress);
   void KeepDetails(const PairVerifier& verifier, const std::vector<ImageId>& ids);
@@ -215,7 +215,7 @@ std::unique_ptr<PairProposer> Pipeline::MakeProposer(const std::vector<ImageId>&
 
 KnownPairsPolicy Pipeline::ChooseKnown(const std::vector<ImageId>& ids,
                                        const PairRestrictions& restrictions,
-                                       const PairVerifier& verifier) {
+                                       PairVerifier& verifier) {
   KnownPairsPolicy known;
   if (result_.listed || result_.replayed || !IsLoop(options_.strategy)) return known;
   GraphMatchOptions graph = LoopOptionsOf(options_);
@@ -299,9 +299,9 @@ void Pipeline::MatchAndVerify() {
 }
 
 void Pipeline::Replay() {
-  FinishedGraph graph =
-      ReadFinishedGraph(options_.replay_path, images_, options_.verification.min_num_inliers,
-                        {options_.verification.lock_timeout, &stop_});
+  FinishedGraph graph = ReadFinishedGraph(options_.replay_path, images_,
+                                          options_.verification.geometry.min_num_inliers,
+                                          {options_.verification.lock_timeout, &stop_});
   WarnOfSkippedLines(graph, options_.replay_path, "two different images", observer_);
   observer_.OnInfo("Replays the matching graph of " + options_.replay_path.string() + ", with " +
                    std::to_string(graph.num_edges) +
@@ -309,6 +309,7 @@ void Pipeline::Replay() {
   ReplayVerifier verifier(std::move(graph.pairs));
   std::unordered_map<ImageId, std::size_t> num_features;
   for (const ImageRecord& image : images_) num_features[image.id] = image.num_features;
+  verifier.SetInliers(std::move(graph.read_inliers));
   verifier.SetStop(&stop_);
   verifier.SetCosts(std::move(num_features), threads_.NumThreads());
   seconds_ = [this, &verifier] {
@@ -319,8 +320,8 @@ void Pipeline::Replay() {
 }
 
 void Pipeline::FindCandidates() {
-  const std::vector<VerifiedPair> known =
-      database_->ReadVerifiedPairs(static_cast<std::size_t>(options_.verification.min_num_inliers));
+  const std::vector<VerifiedPair> known = database_->ReadVerifiedPairs(
+      static_cast<std::size_t>(options_.verification.geometry.min_num_inliers));
   Rank(known);
   const std::vector<ImageRecord>& images = ranked_.images;
   RetrievalOptions retrieval = RetrievalOptionsOf(options_);

@@ -52,6 +52,7 @@ class BatchVerifier : public PairVerifier {
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_; }
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override;
+  const FeatureMatches& Inliers(const ImagePair& pair) override;
 
  private:
   // The shards of what is not known, which is reported.
@@ -63,7 +64,7 @@ class BatchVerifier : public PairVerifier {
   // Matches the pairs here. Those with too few matches are finished; returns the others.
   std::vector<ShardPair> Match(const ShardRunner::Shard& pairs, ShardRunner::Progress& progress);
   // Writes results to the database and returns what it has of these pairs from then on.
-  std::vector<VerifiedPair> Write(const std::vector<PairRows>& results);
+  std::vector<VerifiedPair> Write(const std::vector<PairGeometry>& results);
   // Throws ColmapError once verification has failed on pairs that have nothing in common.
   void CheckThatItWorks(const ShardPart& part);
   void WarnOfCutFeatures(const std::vector<ImageRecord>& images) const;
@@ -75,7 +76,9 @@ class BatchVerifier : public PairVerifier {
   const StopRequest& stop_;
   std::function<void(const std::string&)> on_warning_;
   ShardRunner runner_;
-  std::vector<VerifiedPair> known_;              // Ascending.
+  std::vector<VerifiedPair> known_;  // Ascending.
+  ImagePair inliers_of_;             // The pair that Inliers was asked for last, or that was
+  FeatureMatches inliers_;           // reported last.
   std::unique_ptr<ExactMatcher> exact_matcher_;  // None if COLMAP matches.
   std::vector<ImagePair> unverified_;  // Ascending; their matches are in the database already.
   // Of failures since the last success, no image in two of them.

@@ -1,14 +1,13 @@
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/verification/colmap_arguments.h"
 #include "colmap_graphmatch/verification/subprocess.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 
@@ -29,23 +28,6 @@ constexpr char kMatcherType[] = "FeatureMatching.type";
 // undefined.
 constexpr std::pair<int, int> kFirstDegenerate(4, 2);
 
-// COLMAP's options for what differs from its defaults.
-void AddMatchingOptions(const DescriptorMatchingOptions& matching,
-                        std::map<std::string, std::string>* colmap_options) {
-  const DescriptorMatchingOptions defaults;
-  const auto add = [&](const char* name, auto value, auto default_value) {
-    if (value == default_value) return;
-    // The shortest text that stands for the same number.
-    std::array<char, 32> text = {};
-    const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-    (*colmap_options)[name] = std::string(text.data(), end);
-  };
-  add("max_ratio", matching.max_ratio, defaults.max_ratio);
-  add("max_distance", matching.max_distance, defaults.max_distance);
-  add("cross_check", matching.cross_check ? 1 : 0, defaults.cross_check ? 1 : 0);
-  add("max_num_matches", matching.max_num_matches, defaults.max_num_matches);
-}
-
 }  // namespace
 
 ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const ColmapInstallation& colmap,
@@ -62,22 +44,16 @@ ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const ColmapI
       stop_(stop) {
   for (const ImageRecord& image : images) num_features_.emplace(image.id, image.num_features);
   // Guided matching is COLMAP's: it matches once more where the geometry says so.
-  const std::string* guided = FindOption(options.colmap_options, "guided_matching");
-  const bool is_guided = guided != nullptr && *guided != "0";
-  shards_have_descriptors_ = !plan_.matches_here || is_guided;
+  shards_have_descriptors_ =
+      !plan_.matches_here || options.geometry.guided_matching.value_or(false);
   arguments_ = FindArguments(on_warning);
   MakeTemplate();
 }
 
 std::vector<std::string> ColmapVerifier::FindArguments(
     const std::function<void(const std::string&)>& on_warning) const {
-  std::map<std::string, std::string> colmap_options = options_.colmap_options;
-  AddMatchingOptions(options_.exact.matching, &colmap_options);
-  colmap_options["use_gpu"] = plan_.uses_gpu ? "1" : "0";
-  colmap_options["num_threads"] = std::to_string(plan_.threads_per_process);
-  colmap_options["min_num_inliers"] = std::to_string(options_.min_num_inliers);
   std::vector<std::string> unknown;
-  std::vector<std::string> arguments = colmap_.Arguments(colmap_options, &unknown);
+  std::vector<std::string> arguments = colmap_.Arguments(ColmapOptions(options_, plan_), &unknown);
   if (std::find(unknown.begin(), unknown.end(), kMatcherType) != unknown.end()) {
     throw OptionsError("COLMAP " + colmap_.Version() + " does not have --" + kMatcherType + " " +
                        options_.colmap_options.at(kMatcherType) +
@@ -108,9 +84,10 @@ void ColmapVerifier::MakeTemplate() const {
                     "This COLMAP does not work; name another with --colmap_path.");
 }
 
-int ColmapVerifier::ConfigOfUnmatched() const {
-  // TwoViewGeometry::ConfigurationType: undefined, or degenerate.
-  return std::make_pair(colmap_.major, colmap_.minor) < kFirstDegenerate ? 0 : 1;
+TwoViewConfiguration ColmapVerifier::ConfigurationOfUnmatched() const {
+  return std::make_pair(colmap_.major, colmap_.minor) < kFirstDegenerate
+             ? TwoViewConfiguration::kUndefined
+             : TwoViewConfiguration::kDegenerate;
 }
 
 std::string ColmapVerifier::AdviceOnFailure() const {

@@ -36,7 +36,7 @@ class ColmapVerifier : public GeometryVerifier {
 
   ShardOutcome Verify(const std::vector<ShardPair>& pairs,
                       const std::function<bool()>& should_stop) override;
-  int ConfigOfUnmatched() const override;
+  TwoViewConfiguration ConfigurationOfUnmatched() const override;
   std::string AdviceOnFailure() const override;
 
   // Of all calls of Verify so far.

@@ -60,7 +60,7 @@ ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
 
 bool ExactMatcher::Match(const std::vector<ImagePair>& pairs,
                          const std::function<bool()>& should_stop,
-                         std::vector<std::vector<FeatureMatch>>* matches) {
+                         std::vector<FeatureMatches>* matches) {
   DescriptorMatcher matcher(options_.matching);
   std::deque<std::pair<DescriptorCache::Handle, DescriptorCache::Handle>> requested;
   std::size_t next = 0;

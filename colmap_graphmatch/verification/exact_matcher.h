@@ -38,7 +38,7 @@ class ExactMatcher {
   // next are read. Returns false if should_stop, which is asked before every pair, ended it early.
   // Throws DatabaseError, also if an image has not as many features as it had.
   bool Match(const std::vector<ImagePair>& pairs, const std::function<bool()>& should_stop,
-             std::vector<std::vector<FeatureMatch>>* matches);
+             std::vector<FeatureMatches>* matches);
 
   // Pairs matched so far.
   std::size_t NumPairs() const { return num_pairs_; }

@@ -11,9 +11,9 @@ namespace colmap_graphmatch {
 
 // What became of a shard that a GeometryVerifier was given.
 struct ShardOutcome {
-  std::vector<PairRows> results;  // Of all pairs, in their order, unless something went wrong:
-  std::string problem;            // what, e.g. "ended with exit code 1"; empty if nothing did.
-  bool stopped = false;           // should_stop ended it: neither results nor a problem.
+  std::vector<PairGeometry> results;  // Of all pairs, in their order, unless something was wrong:
+  std::string problem;                // what, e.g. "ended with exit code 1"; empty if nothing did.
+  bool stopped = false;               // should_stop ended it: neither results nor a problem.
 };
 
 // Finds the two-view geometries of the pairs of one shard: pairs with matches in, geometries out.
@@ -28,8 +28,8 @@ class GeometryVerifier {
   virtual ShardOutcome Verify(const std::vector<ShardPair>& pairs,
                               const std::function<bool()>& should_stop) = 0;
 
-  // COLMAP's configuration for a pair with too few matches to be given to Verify.
-  virtual int ConfigOfUnmatched() const = 0;
+  // For a pair with too few matches to be given to Verify.
+  virtual TwoViewConfiguration ConfigurationOfUnmatched() const = 0;
 
   // What a user is told who asks why it fails on everything; empty, or a sentence.
   virtual std::string AdviceOnFailure() const { return ""; }

@@ -6,6 +6,7 @@
 #include "colmap_graphmatch/base/enum_words.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/exact_matcher.h"
+#include "colmap_graphmatch/verification/geometry_options.h"
 
 namespace colmap_graphmatch {
 
@@ -28,13 +29,11 @@ struct VerificationOptions {
   // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
   bool use_gpu = true;
 
-  // A pair is an edge with this many inliers, 0 being as good as 1. Also handed to COLMAP.
-  int min_num_inliers = 15;
+  GeometryOptions geometry;
 
-  // Other options of COLMAP's feature matching and geometric verification, by their names in any
-  // version (e.g. "SiftMatching.max_error") or without a group, as COLMAP is to get them. What is
-  // not here keeps COLMAP's own default. Those of exact.matching do not belong here: COLMAP gets
-  // them from there.
+  // Other options of COLMAP's, by their names in any version (e.g. "SiftMatching.gpu_index") or
+  // without a group, as COLMAP is to get them. What is not here keeps COLMAP's own default. Those
+  // of exact.matching and geometry do not belong here: COLMAP gets them from there.
   std::map<std::string, std::string> colmap_options;
 
   // Pairs a shard at most, the amount of work that a crash of COLMAP or kill -9 can lose.
@@ -56,10 +55,6 @@ inline constexpr EnumWords<VerificationOptions::Matcher, 3> kMatcherWords = {
     {{VerificationOptions::Matcher::kAuto, "auto"},
      {VerificationOptions::Matcher::kExact, "exact"},
      {VerificationOptions::Matcher::kColmap, "colmap"}}};
-
-// The value of an option in colmap_options, in whatever group it was given, or null.
-const std::string* FindOption(const std::map<std::string, std::string>& options,
-                              const std::string& name);
 
 // What the options come to with the COLMAP that is installed.
 struct VerificationPlan {

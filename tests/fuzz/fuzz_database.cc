@@ -53,7 +53,12 @@ class Fuzzer {
 
   void Read(std::size_t choice) {
     Database database(path_, sqlite::Access::kReadWrite, 0);
-    Try([&] { database.ReadTestedPairs(); });
+    Try([&] {
+      for (const TestedPair& tested : database.ReadTestedPairs()) database.ReadInliers(tested.pair);
+    });
+    Try([&] {
+      for (const auto& [id, camera] : database.ReadCameras()) ProblemOf(camera);
+    });
     std::vector<ImagePair> unverified;
     Try([&] { unverified = database.ReadUnverifiedPairs(); });
     const std::vector<ImageRecord> images = WithFeatures(database.ReadImages());
@@ -68,7 +73,7 @@ class Fuzzer {
 
     std::vector<ShardPair> pairs;
     for (std::size_t i = 0; i + 1 < num_images; ++i) {
-      pairs.push_back({ImagePair(images[i].id, images[i + 1].id), sqlite::Blob(16)});
+      pairs.push_back({ImagePair(images[i].id, images[i + 1].id), FeatureMatches(2)});
     }
     // The matches of these are in the database.
     for (std::size_t i = 0; i < std::min(unverified.size(), kMaxImages); ++i) {
@@ -88,9 +93,9 @@ class Fuzzer {
         ReadShard(shard, pairs, num_features);
       });
     }
-    PairRows rows;
-    rows.pair = pairs.empty() ? ImagePair(1, 2) : pairs.front().pair;
-    database.WritePairs({rows});
+    PairGeometry result;
+    result.pair = pairs.empty() ? ImagePair(1, 2) : pairs.front().pair;
+    database.WritePairs({result});
   }
 
   // What cannot be read must not hide what comes after it.
