@@ -1,0 +1,116 @@
+#include "colmap_graphmatch/geometry/robust_estimator.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "colmap_graphmatch/geometry/minimal_solvers.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+// Draws rows without repetition.
+template <std::size_t kSize>
+void Draw(std::size_t num, const std::vector<std::size_t>& order, Random* random,
+          std::array<std::size_t, kSize>* rows) {
+  for (std::size_t i = 0; i < kSize; ++i) {
+    bool is_new = false;
+    while (!is_new) {
+      (*rows)[i] = random->Index(num);
+      is_new = std::find(rows->begin(), rows->begin() + i, (*rows)[i]) == rows->begin() + i;
+    }
+  }
+  if (order.empty()) return;
+  for (std::size_t& row : *rows) row = order[row];
+}
+
+template <ModelKind kKind>
+struct Solver;
+template <>
+struct Solver<ModelKind::kFundamental> {
+  static constexpr std::size_t kSample = kFundamentalSample;
+  static constexpr auto kSolve = SolveFundamental;
+};
+template <>
+struct Solver<ModelKind::kHomography> {
+  static constexpr std::size_t kSample = kHomographySample;
+  static constexpr auto kSolve = SolveHomography;
+};
+
+template <ModelKind kKind>
+RobustModel Estimate(const RobustProblem& problem, const PointPairs& pairs, Random* random) {
+  constexpr std::size_t kSample = Solver<kKind>::kSample;
+  RobustModel result;
+  const std::size_t num = pairs.Num();
+  if (num < std::max(kSample, problem.num_needed)) return result;
+  const Eigen::Matrix3d transform1 = pairs.Transform1();
+  const Eigen::Matrix3d transform2 = pairs.Transform2();
+  const double max_squared_error = std::pow(problem.max_error / pairs.Scale(), 2);
+  const Refiner refiner(kKind, pairs, max_squared_error, Eigen::Matrix3d::Identity(),
+                        Eigen::Matrix3d::Identity());
+  FittedModel best;
+  const auto num_trials = [&] {
+    return std::max(
+        problem.budget.min_num_trials,
+        NumTrials(std::max(best.num_inliers, problem.num_needed), num, kSample, problem.budget));
+  };
+  std::size_t max_num_trials = num_trials();
+  const auto consider = [&](const Eigen::Matrix3d& model) {
+    const std::size_t count =
+        CountInliers(ErrorOf(kKind), pairs, model, max_squared_error, best.num_inliers + 1);
+    if (count == 0) return;
+    best = {model, count};
+    const FittedModel refined = refiner.Refine(model);
+    if (refined.num_inliers > best.num_inliers) best = refined;
+    max_num_trials = num_trials();
+  };
+  const auto to_columns = [&](const Eigen::Matrix3d& model) -> Eigen::Matrix3d {
+    return kKind == ModelKind::kHomography
+               ? Eigen::Matrix3d(transform2 * model * transform1.inverse())
+               : Eigen::Matrix3d(transform2.inverse().transpose() * model * transform1.inverse());
+  };
+  const auto from_columns = [&](const Eigen::Matrix3d& model) -> Eigen::Matrix3d {
+    return kKind == ModelKind::kHomography
+               ? Eigen::Matrix3d(transform2.inverse() * model * transform1)
+               : Eigen::Matrix3d(transform2.transpose() * model * transform1);
+  };
+  if (problem.start) consider(to_columns(*problem.start));
+
+  std::array<std::size_t, kSample> rows{};
+  std::array<PointPair, kSample> sample;
+  MinimalModels models;
+  while (result.num_trials < max_num_trials && result.num_trials < problem.budget.max_num_trials) {
+    ++result.num_trials;
+    Draw(num, problem.order, random, &rows);
+    for (std::size_t i = 0; i < kSample; ++i) sample[i] = pairs.Row(rows[i]);
+    Solver<kKind>::kSolve(sample, &models);
+    for (std::size_t i = 0; i < models.num; ++i) consider(models.models[i]);
+  }
+  result.num_inliers = best.num_inliers;
+  if (best.num_inliers > 0) result.model = from_columns(best.model);
+  return result;
+}
+
+}  // namespace
+
+std::size_t NumTrials(std::size_t num_inliers, std::size_t num_matches, std::size_t sample_size,
+                      const TrialBudget& budget) {
+  const double ratio = static_cast<double>(num_inliers) / static_cast<double>(num_matches);
+  const double success = std::pow(ratio, static_cast<double>(sample_size));
+  if (success >= 1) return 1;
+  const double trials =
+      std::ceil(std::log(1 - budget.confidence) / std::log1p(-success) * budget.multiplier);
+  // Also where nothing fits, and the quotient is infinite or not a number.
+  if (!(trials < static_cast<double>(budget.max_num_trials))) return budget.max_num_trials;
+  return static_cast<std::size_t>(std::max(1.0, trials));
+}
+
+RobustModel EstimateRobustly(const RobustProblem& problem, const PointPairs& pairs,
+                             Random* random) {
+  return problem.kind == ModelKind::kHomography
+             ? Estimate<ModelKind::kHomography>(problem, pairs, random)
+             : Estimate<ModelKind::kFundamental>(problem, pairs, random);
+}
+
+}  // namespace colmap_graphmatch
