@@ -51,6 +51,13 @@ class PointPairs {
     return {begin[0], begin[stride_], begin[2 * stride_], begin[3 * stride_]};
   }
 
+  // A row as it was given, but for single precision.
+  PointPair GivenRow(std::size_t row) const {
+    const PointPair pair = Row(row);
+    return {pair.x1 * scale_ + middle1_.x(), pair.y1 * scale_ + middle1_.y(),
+            pair.x2 * scale_ + middle2_.x(), pair.y2 * scale_ + middle2_.y()};
+  }
+
   double Scale() const { return scale_; }
 
   // Of the given coordinates: what takes them to those of the columns.

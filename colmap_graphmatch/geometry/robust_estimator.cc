@@ -33,6 +33,11 @@ struct Solver<ModelKind::kFundamental> {
   static constexpr auto kSolve = SolveFundamental;
 };
 template <>
+struct Solver<ModelKind::kEssential> {
+  static constexpr std::size_t kSample = kEssentialSample;
+  static constexpr auto kSolve = SolveEssential;
+};
+template <>
 struct Solver<ModelKind::kHomography> {
   static constexpr std::size_t kSample = kHomographySample;
   static constexpr auto kSolve = SolveHomography;
@@ -47,8 +52,9 @@ RobustModel Estimate(const RobustProblem& problem, const PointPairs& pairs, Rand
   const Eigen::Matrix3d transform1 = pairs.Transform1();
   const Eigen::Matrix3d transform2 = pairs.Transform2();
   const double max_squared_error = std::pow(problem.max_error / pairs.Scale(), 2);
-  const Refiner refiner(kKind, pairs, max_squared_error, Eigen::Matrix3d::Identity(),
-                        Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d inverse1 = transform1.inverse();
+  const Eigen::Matrix3d inverse2 = transform2.inverse();
+  const Refiner refiner(kKind, pairs, max_squared_error, inverse1, inverse2);
   FittedModel best;
   const auto num_trials = [&] {
     return std::max(
@@ -67,12 +73,12 @@ RobustModel Estimate(const RobustProblem& problem, const PointPairs& pairs, Rand
   };
   const auto to_columns = [&](const Eigen::Matrix3d& model) -> Eigen::Matrix3d {
     return kKind == ModelKind::kHomography
-               ? Eigen::Matrix3d(transform2 * model * transform1.inverse())
-               : Eigen::Matrix3d(transform2.inverse().transpose() * model * transform1.inverse());
+               ? Eigen::Matrix3d(transform2 * model * inverse1)
+               : Eigen::Matrix3d(inverse2.transpose() * model * inverse1);
   };
   const auto from_columns = [&](const Eigen::Matrix3d& model) -> Eigen::Matrix3d {
     return kKind == ModelKind::kHomography
-               ? Eigen::Matrix3d(transform2.inverse() * model * transform1)
+               ? Eigen::Matrix3d(inverse2 * model * transform1)
                : Eigen::Matrix3d(transform2.transpose() * model * transform1);
   };
   if (problem.start) consider(to_columns(*problem.start));
@@ -83,9 +89,15 @@ RobustModel Estimate(const RobustProblem& problem, const PointPairs& pairs, Rand
   while (result.num_trials < max_num_trials && result.num_trials < problem.budget.max_num_trials) {
     ++result.num_trials;
     Draw(num, problem.order, random, &rows);
-    for (std::size_t i = 0; i < kSample; ++i) sample[i] = pairs.Row(rows[i]);
+    for (std::size_t i = 0; i < kSample; ++i) {
+      // The five-point solver wants normalised image planes.
+      sample[i] = kKind == ModelKind::kEssential ? pairs.GivenRow(rows[i]) : pairs.Row(rows[i]);
+    }
     Solver<kKind>::kSolve(sample, &models);
-    for (std::size_t i = 0; i < models.num; ++i) consider(models.models[i]);
+    for (std::size_t i = 0; i < models.num; ++i) {
+      const Eigen::Matrix3d& model = models.models[i];
+      consider(kKind == ModelKind::kEssential ? to_columns(model) : model);
+    }
   }
   result.num_inliers = best.num_inliers;
   if (best.num_inliers > 0) result.model = from_columns(best.model);
@@ -108,9 +120,15 @@ std::size_t NumTrials(std::size_t num_inliers, std::size_t num_matches, std::siz
 
 RobustModel EstimateRobustly(const RobustProblem& problem, const PointPairs& pairs,
                              Random* random) {
-  return problem.kind == ModelKind::kHomography
-             ? Estimate<ModelKind::kHomography>(problem, pairs, random)
-             : Estimate<ModelKind::kFundamental>(problem, pairs, random);
+  switch (problem.kind) {
+    case ModelKind::kFundamental:
+      return Estimate<ModelKind::kFundamental>(problem, pairs, random);
+    case ModelKind::kEssential:
+      return Estimate<ModelKind::kEssential>(problem, pairs, random);
+    case ModelKind::kHomography:
+      break;
+  }
+  return Estimate<ModelKind::kHomography>(problem, pairs, random);
 }
 
 }  // namespace colmap_graphmatch

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/geometry/camera.h"
+#include "colmap_graphmatch/geometry/configuration.h"
+#include "colmap_graphmatch/geometry/point_pairs.h"
+
+namespace colmap_graphmatch {
+
+// COLMAP's options of the same names and defaults (TwoViewGeometryOptions, RANSACOptions).
+struct TwoViewOptions {
+  double max_error = 4;  // Pixels.
+  std::size_t min_num_inliers = 15;
+  double confidence = 0.999;
+  std::size_t min_num_trials = 100;
+  std::size_t max_num_trials = 10000;
+  double min_inlier_ratio = 0.25;  // No trials for what fits fewer. 0: none is given.
+  bool detect_watermark = true;
+  bool compute_relative_pose = false;
+};
+
+// What is known of two images. The pair's ids seed all random numbers: with the same input the
+// result is the same, bit for bit, on any thread and any processor of an architecture.
+struct TwoViews {
+  ImagePair pair;
+  const Camera& camera1;
+  const Camera& camera2;
+  const std::vector<PointPair>& matches;  // In pixels.
+  // How likely a match is to be right: greater is better, in any unit. Empty: not known.
+  const std::vector<float>& promise;
+};
+
+struct RelativePose {
+  Eigen::Matrix3d rotation;  // cam2_from_cam1, as COLMAP stores it.
+  Eigen::Vector3d translation;
+};
+
+// Where the time went.
+struct TwoViewTrials {
+  std::size_t fundamental = 0;
+  std::size_t essential = 0;
+  std::size_t homography = 0;
+};
+
+struct TwoViewGeometry {
+  TwoViewConfiguration configuration = TwoViewConfiguration::kDegenerate;
+  std::vector<std::size_t> inliers;  // Of the matches, ascending.
+  // The models that were found. In pixels; E on the normalised image planes.
+  std::optional<Eigen::Matrix3d> fundamental;
+  std::optional<Eigen::Matrix3d> essential;
+  std::optional<Eigen::Matrix3d> homography;
+  std::optional<RelativePose> pose;
+  TwoViewTrials trials;
+};
+
+// COLMAP's verdict (EstimateCalibratedTwoViewGeometry if both cameras have a prior focal length,
+// else EstimateUncalibratedTwoViewGeometry, of COLMAP 3.8) with our search. Both cameras must be
+// usable (WhyNotUsable).
+TwoViewGeometry VerifyTwoViews(const TwoViews& views, const TwoViewOptions& options);
+
+// For who asks COLMAP in the end: which matches are near one of the best models.
+struct ScreenedTwoViews {
+  // The most inliers that a model has.
+  std::size_t num_inliers = 0;
+  // The matches that are within `bound` times max_error of one of the models, ascending.
+  std::vector<std::size_t> near;
+  TwoViewTrials trials;
+};
+ScreenedTwoViews ScreenTwoViews(const TwoViews& views, const TwoViewOptions& options, double bound);
+
+}  // namespace colmap_graphmatch
