@@ -9,7 +9,7 @@
 namespace colmap_graphmatch {
 namespace {
 
-constexpr int kMaxSteps = 10;
+constexpr int kMaxSteps = 5;
 // Of the loss: less is not worth another step.
 constexpr double kLeastGain = 1e-3;
 
@@ -61,7 +61,7 @@ FittedModel Minimize(const Problem& problem, typename Problem::State state, Erro
   double norm = model.norm();
   NormalEquations equations;
   ComputeNormalEquations(kind, pairs, model, max_squared_error, &equations);
-  FittedModel best{model, equations.num_inliers};
+  FittedModel best{model, equations.num_inliers, equations.sum_squared};
   double best_loss = loss(equations);
   double damping = 1e-4;
   NormalEquations moved_equations;
@@ -78,9 +78,9 @@ FittedModel Minimize(const Problem& problem, typename Problem::State state, Erro
     const Eigen::Matrix3d moved_model = problem.ToModel(moved);
     ComputeNormalEquations(kind, pairs, moved_model, max_squared_error, &moved_equations);
     const double moved_loss = loss(moved_equations);
-    if (moved_equations.num_inliers > best.num_inliers) {
-      best = {moved_model, moved_equations.num_inliers};
-    }
+    const FittedModel candidate{moved_model, moved_equations.num_inliers,
+                                moved_equations.sum_squared};
+    if (candidate.IsBetterThan(best)) best = candidate;
     if (!(moved_loss < best_loss)) {
       damping *= 100;
       if (damping > 1) break;

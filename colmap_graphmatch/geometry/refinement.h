@@ -18,6 +18,13 @@ inline ErrorKind ErrorOf(ModelKind kind) {
 struct FittedModel {
   Eigen::Matrix3d model = Eigen::Matrix3d::Zero();
   std::size_t num_inliers = 0;
+  double sum_squared = 0;  // Of their errors.
+
+  // COLMAP's order (InlierSupportMeasurer).
+  bool IsBetterThan(const FittedModel& other) const {
+    return num_inliers > other.num_inliers ||
+           (num_inliers == other.num_inliers && sum_squared < other.sum_squared);
+  }
 };
 
 // What fits more matches near a model, if there is something: the best that some steps of

@@ -10,7 +10,16 @@
 namespace colmap_graphmatch {
 namespace {
 
-// Draws rows without repetition.
+// Where no model has enough inliers, those of which so many are missing, or fewer, are refined,
+// too: with few matches to search in, that finds the missing ones more often than further samples
+// do.
+constexpr std::size_t kClose = 3;
+
+// Trials in which samples come from the more promising matches (as in PROSAC, Chum and Matas, CVPR
+// 2005): from more of them with every trial, then from all.
+constexpr std::size_t kNumPromising = 50;
+
+// Draws rows without repetition, of the first num.
 template <std::size_t kSize>
 void Draw(std::size_t num, const std::vector<std::size_t>& order, Random* random,
           std::array<std::size_t, kSize>* rows) {
@@ -62,13 +71,26 @@ RobustModel Estimate(const RobustProblem& problem, const PointPairs& pairs, Rand
         NumTrials(std::max(best.num_inliers, problem.num_needed), num, kSample, problem.budget));
   };
   std::size_t max_num_trials = num_trials();
+  // The fewest inliers with which a model is worth refining.
+  const auto least_count = [&] {
+    const std::size_t best_count = best.num_inliers;
+    const std::size_t least = best_count > kSample ? best_count : best_count + 1;
+    const bool is_close =
+        best_count < problem.num_needed && best_count + kClose >= problem.num_needed;
+    return is_close ? std::min(least, problem.num_needed - kClose) : least;
+  };
   const auto consider = [&](const Eigen::Matrix3d& model) {
     const std::size_t count =
-        CountInliers(ErrorOf(kKind), pairs, model, max_squared_error, best.num_inliers + 1);
+        CountInliers(ErrorOf(kKind), pairs, model, max_squared_error, least_count());
     if (count == 0) return;
-    best = {model, count};
+    if (count == best.num_inliers && count >= problem.num_needed) {
+      NormalEquations equations;
+      ComputeNormalEquations(ErrorOf(kKind), pairs, model.normalized(), max_squared_error,
+                             &equations);
+      if (!(equations.sum_squared < best.sum_squared)) return;
+    }
     const FittedModel refined = refiner.Refine(model);
-    if (refined.num_inliers > best.num_inliers) best = refined;
+    if (refined.IsBetterThan(best)) best = refined;
     max_num_trials = num_trials();
   };
   const auto to_columns = [&](const Eigen::Matrix3d& model) -> Eigen::Matrix3d {
@@ -87,8 +109,12 @@ RobustModel Estimate(const RobustProblem& problem, const PointPairs& pairs, Rand
   std::array<PointPair, kSample> sample;
   MinimalModels models;
   while (result.num_trials < max_num_trials && result.num_trials < problem.budget.max_num_trials) {
+    std::size_t num_drawn_from = num;
+    if (!problem.order.empty() && result.num_trials < kNumPromising) {
+      num_drawn_from = kSample + (num - kSample) * (result.num_trials + 1) / kNumPromising;
+    }
     ++result.num_trials;
-    Draw(num, problem.order, random, &rows);
+    Draw(num_drawn_from, problem.order, random, &rows);
     for (std::size_t i = 0; i < kSample; ++i) {
       // The five-point solver wants normalised image planes.
       sample[i] = kKind == ModelKind::kEssential ? pairs.GivenRow(rows[i]) : pairs.Row(rows[i]);

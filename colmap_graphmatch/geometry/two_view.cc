@@ -9,6 +9,7 @@
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/geometry/inliers.h"
 #include "colmap_graphmatch/geometry/robust_estimator.h"
+#include "colmap_graphmatch/geometry/watermark.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -36,6 +37,10 @@ Eigen::Matrix3d Calibration(const Camera& camera) {
   return calibration;
 }
 
+bool IsCalibrated(const Camera& camera) {
+  return camera.has_prior_focal_length && !WhyNotUsable(camera);
+}
+
 struct Fit {
   std::optional<Eigen::Matrix3d> model;
   std::vector<std::size_t> inliers;
@@ -50,7 +55,7 @@ class Search {
         random_({views.pair.id1, views.pair.id2}),
         pairs_(views.matches),
         order_(OrderByPromise(pairs_, views.promise)) {
-    is_calibrated_ = views.camera1.has_prior_focal_length && views.camera2.has_prior_focal_length;
+    is_calibrated_ = IsCalibrated(views.camera1) && IsCalibrated(views.camera2);
     if (!is_calibrated_) return;
     const double nan = std::numeric_limits<double>::quiet_NaN();
     normalized_.reserve(views.matches.size());
@@ -196,6 +201,14 @@ TwoViewGeometry VerifyTwoViews(const TwoViews& views, const TwoViewOptions& opti
     case InlierSource::kHomography:
       geometry.inliers = search.homography.inliers;
       break;
+  }
+  if (options.compute_relative_pose &&
+      geometry.configuration == TwoViewConfiguration::kCalibrated) {
+    geometry.pose = PoseOfEssential(*geometry.essential, search.Normalized(), geometry.inliers);
+  }
+  if (options.detect_watermark && IsWatermark(views.camera1, views.camera2, views.matches,
+                                              geometry.inliers, options.max_error)) {
+    geometry.configuration = TwoViewConfiguration::kWatermark;
   }
   return geometry;
 }

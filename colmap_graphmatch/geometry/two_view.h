@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "colmap_graphmatch/geometry/camera.h"
 #include "colmap_graphmatch/geometry/configuration.h"
 #include "colmap_graphmatch/geometry/point_pairs.h"
+#include "colmap_graphmatch/geometry/relative_pose.h"
 
 namespace colmap_graphmatch {
 
@@ -36,11 +36,6 @@ struct TwoViews {
   const std::vector<float>& promise;
 };
 
-struct RelativePose {
-  Eigen::Matrix3d rotation;  // cam2_from_cam1, as COLMAP stores it.
-  Eigen::Vector3d translation;
-};
-
 // Where the time went.
 struct TwoViewTrials {
   std::size_t fundamental = 0;
@@ -55,13 +50,14 @@ struct TwoViewGeometry {
   std::optional<Eigen::Matrix3d> fundamental;
   std::optional<Eigen::Matrix3d> essential;
   std::optional<Eigen::Matrix3d> homography;
-  std::optional<RelativePose> pose;
+  std::optional<RelativePose> pose;  // Of calibrated pairs, if it was asked for.
   TwoViewTrials trials;
 };
 
 // COLMAP's verdict (EstimateCalibratedTwoViewGeometry if both cameras have a prior focal length,
-// else EstimateUncalibratedTwoViewGeometry, of COLMAP 3.8) with our search. Both cameras must be
-// usable (WhyNotUsable).
+// else EstimateUncalibratedTwoViewGeometry, of COLMAP 3.8) with our search. Who has cameras that
+// are not usable (WhyNotUsable) should not ask; they count as ones without a prior focal length.
+// Fewer matches than min_num_inliers: degenerate.
 TwoViewGeometry VerifyTwoViews(const TwoViews& views, const TwoViewOptions& options);
 
 // For who asks COLMAP in the end: which matches are near one of the best models.

@@ -2,13 +2,16 @@
 //
 //   benchmark_geometry DATABASE [ONE_PAIR_IN]
 //
-// prints how the verdicts differ, the number of inliers as a ratio, and where the time went.
+// prints how the verdicts differ, the number of inliers as a ratio, where the time went, and what a
+// screen would keep.
 
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -24,6 +27,7 @@ struct StoredPair {
   std::vector<PointPair> points;
   std::size_t num_inliers = 0;
   int config = 0;
+  std::set<std::size_t> inliers;  // Of the matches.
 };
 
 struct Stored {
@@ -61,7 +65,7 @@ Stored Read(const std::string& path, std::size_t one_in) {
     keypoints[id] = database.ReadKeypoints(id);
   }
   sqlite::Statement pairs(connection,
-                          "SELECT m.pair_id, m.data, t.rows, t.config FROM matches m "
+                          "SELECT m.pair_id, m.data, t.rows, t.config, t.data FROM matches m "
                           "JOIN two_view_geometries t ON m.pair_id = t.pair_id "
                           "WHERE m.rows >= 15 ORDER BY m.pair_id");
   std::size_t num = 0;
@@ -81,6 +85,16 @@ Stored Read(const std::string& path, std::size_t one_in) {
     }
     pair.num_inliers = static_cast<std::size_t>(pairs.Int(2));
     pair.config = static_cast<int>(pairs.Int(3));
+    const sqlite::Blob inlier_data = pairs.CopyBlob(4);
+    std::vector<std::uint32_t> inliers(inlier_data.size() / sizeof(std::uint32_t));
+    std::memcpy(inliers.data(), inlier_data.data(), inlier_data.size());
+    std::set<std::pair<std::uint32_t, std::uint32_t>> are_inliers;
+    for (std::size_t i = 0; i + 1 < inliers.size(); i += 2) {
+      are_inliers.insert({inliers[i], inliers[i + 1]});
+    }
+    for (std::size_t i = 0; i + 1 < matches.size(); i += 2) {
+      if (are_inliers.count({matches[i], matches[i + 1]}) > 0) pair.inliers.insert(i / 2);
+    }
     stored.pairs.push_back(std::move(pair));
   }
   return stored;
@@ -120,8 +134,7 @@ struct Group {
   }
 };
 
-void Run(const std::string& path, std::size_t one_in) {
-  const Stored stored = Read(path, one_in);
+void Compare(const Stored& stored) {
   const TwoViewOptions options;
   std::map<std::string, Group> groups;
   std::vector<std::size_t> lost;
@@ -180,6 +193,49 @@ void Run(const std::string& path, std::size_t one_in) {
   fmt::print("\n");
 }
 
+// What is kept for COLMAP where it has the last word.
+void Screen(const Stored& stored) {
+  const TwoViewOptions options;
+  fmt::print("\nreachable below  edges lost  others settled\n");
+  std::map<std::size_t, std::pair<std::size_t, std::size_t>> below;
+  std::map<double, std::vector<double>> kept;
+  std::map<double, double> share;
+  std::size_t num_others = 0;
+  for (const StoredPair& pair : stored.pairs) {
+    const Camera& camera1 = stored.cameras.at(stored.camera_of.at(pair.pair.id1));
+    const Camera& camera2 = stored.cameras.at(stored.camera_of.at(pair.pair.id2));
+    const bool is_edge = IsEdge(pair.num_inliers, pair.config, options.min_num_inliers);
+    if (!is_edge) ++num_others;
+    for (const double bound : {1.0, 1.25, 1.5, 2.0}) {
+      const ScreenedTwoViews screened =
+          ScreenTwoViews({pair.pair, camera1, camera2, pair.points, {}}, options, bound);
+      if (bound == 1.0) {
+        for (std::size_t least = 10; least <= 15; ++least) {
+          if (screened.num_inliers < least) ++(is_edge ? below[least].first : below[least].second);
+        }
+      }
+      if (!is_edge) continue;
+      std::size_t num = 0;
+      for (const std::size_t match : screened.near) num += pair.inliers.count(match);
+      kept[bound].push_back(static_cast<double>(num) / static_cast<double>(pair.inliers.size()));
+      share[bound] +=
+          static_cast<double>(screened.near.size()) / static_cast<double>(pair.points.size());
+    }
+  }
+  for (const auto& [least, nums] : below) {
+    fmt::print("{:>15}  {:>10}  {:>13.0f} %\n", least, nums.first,
+               100 * static_cast<double>(nums.second) / static_cast<double>(num_others));
+  }
+  fmt::print("bound  COLMAP's inliers kept: mean, 5th percentile; matches of edges kept\n");
+  for (const auto& [bound, ratios] : kept) {
+    double sum = 0;
+    for (const double ratio : ratios) sum += ratio;
+    const auto num = static_cast<double>(ratios.size());
+    fmt::print("{:>5}  {:.4f}  {:.4f}  {:.3f}\n", bound, sum / num, Percentile(ratios, 5),
+               share[bound] / num);
+  }
+}
+
 }  // namespace
 }  // namespace colmap_graphmatch
 
@@ -189,8 +245,10 @@ int main(int argc, char** argv) {
     return 1;
   }
   try {
-    colmap_graphmatch::Run(argv[1],
-                           argc > 2 ? std::max(1UL, std::strtoul(argv[2], nullptr, 10)) : 1);
+    const std::size_t one_in = argc > 2 ? std::max(1UL, std::strtoul(argv[2], nullptr, 10)) : 1;
+    const colmap_graphmatch::Stored stored = colmap_graphmatch::Read(argv[1], one_in);
+    colmap_graphmatch::Compare(stored);
+    colmap_graphmatch::Screen(stored);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 1;
