@@ -70,7 +70,7 @@ class Database {
   void ExpectFeatures(const std::vector<ImageRecord>& images,
                       const std::vector<ImageFingerprint>& fingerprints);
 
-  // Every camera, as it is: see ProblemOf in base/camera.h.
+  // Every camera, as it is.
   std::map<CameraId, Camera> ReadCameras();
 
   // The frame of every image that has one (COLMAP 3.12 and later): what the cameras of a rig took
