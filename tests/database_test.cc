@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -194,30 +195,26 @@ TEST_P(AnySchema, ReadsCameras) {
   const std::map<CameraId, Camera> cameras = Open().ReadCameras();
   const Camera& camera = cameras.at(images.front().camera_id);
   EXPECT_EQ(camera.id, images.front().camera_id);
-  EXPECT_EQ(FindCameraModel(camera.model_id)->name, "SIMPLE_RADIAL");
+  EXPECT_EQ(camera.model_id, 2);
   EXPECT_EQ(camera.width, 640);
   EXPECT_EQ(camera.height, 480);
   EXPECT_THAT(camera.params, ElementsAre(1000, 320, -0.5, 0.1));
   EXPECT_TRUE(camera.has_prior_focal_length);
-  EXPECT_EQ(ProblemOf(camera), "");
 }
 
-TEST_F(DatabaseTest, CamerasThatCannotBeAreReadAndSaidToBeSo) {
+TEST_F(DatabaseTest, CamerasThatCannotBeAreReadAsTheyAre) {
   Write();
-  const auto problem = [this](const std::string& values) {
+  const auto read = [this](const std::string& values) {
     Execute("UPDATE cameras SET " + values);
-    return ProblemOf(Open().ReadCameras().begin()->second);
+    return Open().ReadCameras().begin()->second;
   };
-  EXPECT_EQ(problem("model = 3, width = 4, height = 3, params = zeroblob(40)"), "");
-  EXPECT_EQ(problem("params = zeroblob(24)"), "has 3 parameters, where RADIAL has 5");
-  EXPECT_EQ(problem("params = zeroblob(43)"), "");
-  EXPECT_EQ(problem("params = NULL"), "has 0 parameters, where RADIAL has 5");
-  EXPECT_THAT(problem("params = zeroblob(100000)"), HasSubstr("where RADIAL has 5"));
-  EXPECT_EQ(problem("params = CAST(zeroblob(32) || x'000000000000F87F' AS BLOB)"),
-            "has a parameter that is no number");
-  EXPECT_EQ(problem("params = zeroblob(40), width = -7"), "has no width or height");
-  EXPECT_EQ(problem("model = 99"), "has the unknown model 99");
-  EXPECT_EQ(problem("model = 4294967299"), "has the unknown model 2147483647");
+  EXPECT_THAT(read("params = zeroblob(24)").params, SizeIs(3));
+  EXPECT_THAT(read("params = zeroblob(43)").params, SizeIs(5));
+  EXPECT_THAT(read("params = NULL").params, IsEmpty());
+  EXPECT_THAT(read("params = zeroblob(100000)").params, SizeIs(64));
+  EXPECT_EQ(read("width = -7").width, -1);
+  EXPECT_EQ(read("height = 4294967299").height, std::numeric_limits<int>::max());
+  EXPECT_EQ(read("model = 4294967299").model_id, std::numeric_limits<int>::max());
 }
 
 TEST_P(AnySchema, LeavesTheVersionAlone) {

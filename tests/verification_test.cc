@@ -361,6 +361,37 @@ TEST_F(ExactMatcherTest, ColmapOnlyGetsPairsWithEnoughMatches) {
   EXPECT_EQ(statistics_.num_image_reads, 25U);
 }
 
+TEST_F(ExactMatcherTest, SaysWhereMatchesAreIfItIsAsked) {
+  Database database(database_path_, sqlite::Access::kRead, 5);
+  const std::vector<ImageRecord> images = database.ReadImages();
+  const Keypoints keypoints1 = database.ReadKeypoints(images[0]);
+  const Keypoints keypoints2 = database.ReadKeypoints(images[1]);
+  const auto match = [&](ExactMatcher::Points points) {
+    ExactMatcher matcher(options_.exact, points, database_path_, images, 5, 1);
+    std::vector<MatchedPair> matched;
+    EXPECT_TRUE(matcher.Match(
+        {ImagePair(1, 2)}, [] { return false; }, &matched));
+    return matched.front();
+  };
+  const MatchedPair without = match(ExactMatcher::Points::kLeftOut);
+  EXPECT_THAT(without.points, IsEmpty());
+  EXPECT_THAT(without.distinctness, IsEmpty());
+  const MatchedPair with = match(ExactMatcher::Points::kGiven);
+  EXPECT_EQ(with.matches, without.matches);
+  ASSERT_THAT(with.points, SizeIs(with.matches.size()));
+  ASSERT_THAT(with.distinctness, SizeIs(with.matches.size()));
+  for (std::size_t i = 0; i < with.matches.size(); ++i) {
+    const float* first = &keypoints1.data[with.matches[i].feature1 * keypoints1.num_cols];
+    const float* second = &keypoints2.data[with.matches[i].feature2 * keypoints2.num_cols];
+    EXPECT_EQ(with.points[i].x1, first[0]);
+    EXPECT_EQ(with.points[i].y1, first[1]);
+    EXPECT_EQ(with.points[i].x2, second[0]);
+    EXPECT_EQ(with.points[i].y2, second[1]);
+    EXPECT_GT(with.distinctness[i], 1 - options_.exact.matching.max_ratio);
+    EXPECT_LE(with.distinctness[i], 1);
+  }
+}
+
 TEST_F(ExactMatcherTest, UnmatchedPairsGetTheRowsOfColmap) {
   EXPECT_TRUE(Verify({ImagePair(1, 6)}));
   sqlite::Connection connection(database_path_, sqlite::Access::kRead, 5);

@@ -24,6 +24,14 @@ static_assert(sizeof(FeatureMatch) == 2 * sizeof(std::uint32_t));
 
 using FeatureMatches = std::vector<FeatureMatch>;
 
+// Where the features of a match are, in pixels (or in any other plane) of the two images.
+struct PointPair {
+  double x1 = 0;
+  double y1 = 0;
+  double x2 = 0;
+  double y2 = 0;
+};
+
 // Reads the inlier matches of a pair, feature1 being that of the smaller image id. What it returns
 // stays valid until it is called again.
 using InlierReader = std::function<const FeatureMatches&()>;

@@ -54,9 +54,11 @@ class Database {
   // The features of one image; no rows if it has none.
   Descriptors ReadDescriptors(ImageId image_id);
 
-  // Throws if there are not as many as when the images were listed.
-  Descriptors ReadDescriptors(const ImageRecord& image);
   Keypoints ReadKeypoints(ImageId image_id);
+
+  // Throw if there are not as many as when the images were listed.
+  Descriptors ReadDescriptors(const ImageRecord& image);
+  Keypoints ReadKeypoints(const ImageRecord& image);
 
   // What tells whether the features of an image are still the same: their number and the beginnings
   // of their descriptors and keypoints. Images without features are left out.
@@ -68,7 +70,7 @@ class Database {
   void ExpectFeatures(const std::vector<ImageRecord>& images,
                       const std::vector<ImageFingerprint>& fingerprints);
 
-  // Every camera, as it is: see ProblemOf in base/camera.h.
+  // Every camera, as it is.
   std::map<CameraId, Camera> ReadCameras();
 
   // The frame of every image that has one (COLMAP 3.12 and later): what the cameras of a rig took
@@ -108,6 +110,8 @@ class Database {
 
  private:
   void CheckSchema();
+  // Throws if these are not all features of the image.
+  void CheckNumber(std::size_t num_rows, const ImageRecord& image) const;
   // Whether the features of an image have this fingerprint.
   bool HasFeatures(const ImageRecord& image, std::int64_t features);
   void CheckFeatures(const std::vector<PairGeometry>& pairs);

@@ -149,14 +149,24 @@ Descriptors Database::ReadDescriptors(ImageId image_id) {
   return descriptors;
 }
 
+void Database::CheckNumber(std::size_t num_rows, const ImageRecord& image) const {
+  if (num_rows == image.num_features) return;
+  throw DatabaseError("The features of image \"" + image.name + "\" (id " +
+                      std::to_string(image.id) + ") in " + Path().string() +
+                      " changed while they were read. Let the other program finish first.");
+}
+
 Descriptors Database::ReadDescriptors(const ImageRecord& image) {
   Descriptors descriptors = ReadDescriptors(image.id);
-  if (descriptors.num_rows != image.num_features) {
-    throw DatabaseError("The features of image \"" + image.name + "\" (id " +
-                        std::to_string(image.id) + ") in " + Path().string() +
-                        " changed while they were read. Let the other program finish first.");
-  }
+  CheckNumber(descriptors.num_rows, image);
   return descriptors;
+}
+
+Keypoints Database::ReadKeypoints(const ImageRecord& image) {
+  Keypoints keypoints = ReadKeypoints(image.id);
+  CheckNumber(keypoints.num_rows, image);
+  if (keypoints.num_rows > 0 && keypoints.num_cols < 2) CheckNumber(0, image);
+  return keypoints;
 }
 
 Keypoints Database::ReadKeypoints(ImageId image_id) {

@@ -40,8 +40,11 @@ class DescriptorMatcher {
  public:
   explicit DescriptorMatcher(const DescriptorMatchingOptions& options);
 
-  // By ascending feature1. Either image may have no descriptors.
-  FeatureMatches Match(const DescriptorView& image1, const DescriptorView& image2);
+  // By ascending feature1. Either image may have no descriptors. distinctness: of every match how
+  // much nearer it is than the second nearest of the second image, from 0 (just as near) to 1;
+  // may be null.
+  FeatureMatches Match(const DescriptorView& image1, const DescriptorView& image2,
+                       std::vector<float>* distinctness = nullptr);
 
  private:
   bool Passes(std::int32_t best, std::int32_t second) const;

@@ -61,9 +61,10 @@ BatchVerifier::BatchVerifier(const VerificationOptions& options, const Verificat
   for (const ImageRecord& image : images) names_.emplace(image.id, image.name);
   known_ = database.ReadVerifiedPairs(static_cast<std::size_t>(options.geometry.min_num_inliers));
   if (!plan.matches_here) return;
-  exact_matcher_ = std::make_unique<ExactMatcher>(options.exact, database.Path(), images,
-                                                  sqlite::LockPatience(options.lock_timeout, &stop),
-                                                  static_cast<std::size_t>(plan.num_processes));
+  exact_matcher_ =
+      std::make_unique<ExactMatcher>(options.exact, ExactMatcher::Points::kLeftOut, database.Path(),
+                                     images, sqlite::LockPatience(options.lock_timeout, &stop),
+                                     static_cast<std::size_t>(plan.num_processes));
   unverified_ = database.ReadUnverifiedPairs();
   WarnOfCutFeatures(images);
 }
@@ -127,20 +128,20 @@ std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
   if (to_match.empty()) return to_verify;
 
   const double start = ThreadCpuSeconds();
-  std::vector<FeatureMatches> matches;
+  std::vector<MatchedPair> matched;
   const auto should_stop = [&progress] { return progress.GivesUp(); };
-  if (!exact_matcher_->Match(to_match, should_stop, &matches)) return {};
+  if (!exact_matcher_->Match(to_match, should_stop, &matched)) return {};
   ShardPart unmatched;
   unmatched.is_verified = false;
   for (std::size_t i = 0; i < to_match.size(); ++i) {
-    if (matches[i].size() < static_cast<std::size_t>(options_.geometry.min_num_inliers)) {
+    if (matched[i].matches.size() < static_cast<std::size_t>(options_.geometry.min_num_inliers)) {
       PairGeometry result;
       result.pair = to_match[i];
-      result.num_dropped_matches = matches[i].size();
+      result.num_dropped_matches = matched[i].matches.size();
       result.geometry.configuration = geometry_.ConfigurationOfUnmatched();
       unmatched.results.push_back(std::move(result));
     } else {
-      to_verify.push_back({to_match[i], std::move(matches[i])});
+      to_verify.push_back({to_match[i], std::move(matched[i].matches)});
     }
   }
   {
