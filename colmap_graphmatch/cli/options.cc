@@ -223,9 +223,9 @@ class Parser {
                                     option.string_key + ". " + Suggest(option.string_key);
         if (group == "GraphMatching") throw OptionsError(problem);
         // It may be one of a newer COLMAP.
-        static const std::set<std::string> kMatchingGroups = {
+        static const std::set<std::string> kColmapsGroups = {
             "SiftMatching", "TwoViewGeometry", "FeatureMatching", "VocabTreeMatching"};
-        if (kMatchingGroups.count(group) > 0) line_->warnings.push_back(problem);
+        if (kColmapsGroups.count(group) > 0) line_->warnings.push_back(problem);
         continue;
       }
       const std::string value = option.value.empty() ? "" : option.value.front();

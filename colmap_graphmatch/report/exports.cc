@@ -26,8 +26,8 @@ struct EdgeProperties {
   std::size_t inliers = 0;
 };
 
-using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS, ImageProperties,
-                                    EdgeProperties>;
+using ExportedGraph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS,
+                                            ImageProperties, EdgeProperties>;
 
 // What XML and the language of Graphviz can hold: UTF-8 without control characters.
 std::string PrintableName(const std::string& name) {
@@ -41,9 +41,9 @@ std::string PrintableName(const std::string& name) {
   return printable;
 }
 
-Graph MakeGraph(const PipelineResult& result) {
+ExportedGraph MakeGraph(const PipelineResult& result) {
   const std::vector<GraphEdge> edges = EdgesOf(result, ImageIndex(result.images));
-  Graph graph(result.images.size());
+  ExportedGraph graph(result.images.size());
   for (std::size_t i = 0; i < result.images.size(); ++i) {
     graph[i] = {result.images[i].id, PrintableName(result.images[i].name), 0};
   }
@@ -97,7 +97,7 @@ PairListNames WritePairList(const std::filesystem::path& path, const PipelineRes
 }
 
 void WriteGraph(const std::filesystem::path& path, const PipelineResult& result) {
-  Graph graph = MakeGraph(result);
+  ExportedGraph graph = MakeGraph(result);
   const bool is_dot = path.extension() == ".dot" || path.extension() == ".gv";
   if (is_dot) {
     // Boost escapes quotation marks alone.
