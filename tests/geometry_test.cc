@@ -66,6 +66,55 @@ TEST(Polynomial, CubicWithOneRealRoot) {
   EXPECT_EQ(CubicRoots(std::nan(""), 0, 0, &roots), 0);
 }
 
+TEST(Polynomial, RealRootsAreThoseThatThePolynomialWasMadeFrom) {
+  Random random({4});
+  for (int i = 0; i < 1000; ++i) {
+    // Some real roots, from all of the line, and pairs of others.
+    std::vector<double> expected;
+    std::vector<double> polynomial = {1};
+    const auto multiply = [&](std::initializer_list<double> factor) {
+      std::vector<double> product(polynomial.size() + factor.size() - 1);
+      for (std::size_t a = 0; a < polynomial.size(); ++a) {
+        for (std::size_t b = 0; b < factor.size(); ++b) {
+          product[a + b] += polynomial[a] * factor.begin()[b];
+        }
+      }
+      polynomial = product;
+    };
+    const std::size_t num_real = 2 * random.Index(6);
+    while (expected.size() < num_real) {
+      const double root = std::tan(3 * (random.Uniform() - 0.5));
+      const auto is_near = [&](double other) { return std::abs(other - root) < 0.05; };
+      if (std::any_of(expected.begin(), expected.end(), is_near)) continue;
+      expected.push_back(root);
+      multiply({-root, 1});
+    }
+    while (polynomial.size() < 11) {
+      const double real = 2 * random.Uniform() - 1;
+      const double imaginary = 0.2 + random.Uniform();
+      multiply({real * real + imaginary * imaginary, -2 * real, 1});
+    }
+    std::array<double, 10> roots{};
+    const int num = RealRoots<10>(polynomial.data(), &roots);
+    ASSERT_EQ(static_cast<std::size_t>(num), expected.size());
+    std::sort(roots.begin(), roots.begin() + num);
+    std::sort(expected.begin(), expected.end());
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_NEAR(roots[k], expected[k], 1e-4 * (1 + std::abs(expected[k])));
+    }
+  }
+}
+
+TEST(Polynomial, HopelessPolynomialsHaveNoRoots) {
+  std::array<double, 10> roots{};
+  std::array<double, 11> polynomial{};
+  EXPECT_EQ(RealRoots<10>(polynomial.data(), &roots), 0);
+  polynomial[3] = std::nan("");
+  EXPECT_EQ(RealRoots<10>(polynomial.data(), &roots), 0);
+  polynomial[3] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(RealRoots<10>(polynomial.data(), &roots), 0);
+}
+
 TEST(Fundamental, SevenPointsGiveTheModelThatTheyWereMadeBy) {
   int num_found = 0;
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
@@ -176,6 +225,8 @@ TEST(Scoring, NormalEquationsAreThoseOfNumericalDerivatives) {
         kind == ErrorKind::kEpipolar
             ? Eigen::Matrix3d(pairs.Transform2().inverse().transpose() * estimate.model * t1)
             : Eigen::Matrix3d(pairs.Transform2() * estimate.model * t1);
+    // Away from where the derivatives vanish.
+    for (double& entry : model.reshaped()) entry += 2e-3 * model.norm() * (random.Uniform() - 0.5);
     model.normalize();
     const double max_squared_error = std::pow(6 / pairs.Scale(), 2);
     std::vector<PointPair> inliers;
@@ -198,8 +249,7 @@ TEST(Scoring, NormalEquationsAreThoseOfNumericalDerivatives) {
       Eigen::Matrix3d less = model;
       more(i / 3, i % 3) += kStep;
       less(i / 3, i % 3) -= kStep;
-      EXPECT_NEAR(equations.jtr(i), (loss(more) - loss(less)) / (4 * kStep), 1e-3 * scale + 1e-6)
-          << i;
+      EXPECT_NEAR(equations.jtr(i), (loss(more) - loss(less)) / (4 * kStep), 2e-3 * scale) << i;
     }
     EXPECT_LT((equations.jtj - equations.jtj.transpose()).norm(), 1e-12);
     // The model's own direction changes nothing.
@@ -235,6 +285,67 @@ TEST(Robust, FundamentalFindsTheInliersAmongAnyNumberOfOutliers) {
   }
 }
 
+TEST(Robust, EssentialFindsTheInliersAmongAnyNumberOfOutliers) {
+  for (const double outliers : {0.0, 0.3, 0.6, 0.8}) {
+    for (const SyntheticScene scene : {SyntheticScene::kGeneral, SyntheticScene::kForward,
+                                       SyntheticScene::kTranslation, SyntheticScene::kPlane}) {
+      for (std::uint64_t seed = 0; seed < 3; ++seed) {
+        const SyntheticViews views(scene, 200, 0.5, outliers, seed);
+        std::vector<PointPair> normalized;
+        for (const PointPair& pair : views.pairs) {
+          normalized.push_back(SyntheticViews::Normalized(pair));
+        }
+        RobustProblem problem;
+        problem.kind = ModelKind::kEssential;
+        problem.max_error = 4 / SyntheticViews::kFocalLength;
+        problem.budget.max_num_trials = 20000;
+        Random random({seed});
+        const RobustModel estimate = EstimateRobustly(problem, PointPairs(normalized), &random);
+        EXPECT_GE(estimate.num_inliers + 3, views.num_inliers);
+        // Two equal singular values, and none.
+        const Eigen::Matrix3d model = estimate.model.normalized();
+        const Eigen::Matrix3d square = model * model.transpose();
+        EXPECT_LT((2 * square * model - square.trace() * model).norm(), 1e-9);
+        // All but a match on the very threshold.
+        const std::size_t plain =
+            PlainCount(ErrorKind::kEpipolar, model, normalized, std::pow(problem.max_error, 2));
+        EXPECT_LE(plain, estimate.num_inliers + 1);
+        EXPECT_LE(estimate.num_inliers, plain + 1);
+      }
+    }
+  }
+}
+
+// Points on a plane fit a family of fundamental matrices; one of them is found.
+TEST(Robust, FundamentalOfAPlaneOrATurn) {
+  for (const SyntheticScene scene : {SyntheticScene::kPlane, SyntheticScene::kRotation}) {
+    for (const double outliers : {0.0, 0.5}) {
+      const SyntheticViews views(scene, 200, 0.5, outliers, 1);
+      RobustProblem problem;
+      problem.max_error = 4;
+      Random random({1});
+      const RobustModel estimate = EstimateRobustly(problem, PointPairs(views.pairs), &random);
+      EXPECT_GE(estimate.num_inliers + 2, views.num_inliers);
+    }
+  }
+}
+
+TEST(Robust, FewPoints) {
+  for (std::size_t num = 0; num <= 20; ++num) {
+    const SyntheticViews views(SyntheticScene::kGeneral, num, 0.2, 0, num);
+    RobustProblem problem;
+    problem.max_error = 4;
+    Random random({num});
+    const RobustModel estimate = EstimateRobustly(problem, PointPairs(views.pairs), &random);
+    if (num < 7) {
+      EXPECT_EQ(estimate.num_inliers, 0U);
+      EXPECT_EQ(estimate.num_trials, 0U);
+    } else {
+      EXPECT_EQ(estimate.num_inliers, num);
+    }
+  }
+}
+
 TEST(Robust, HomographyFindsPlanesAndRotations) {
   for (const double outliers : {0.0, 0.5, 0.8, 0.95}) {
     for (const SyntheticScene scene : {SyntheticScene::kPlane, SyntheticScene::kRotation}) {
@@ -258,7 +369,8 @@ TEST(Robust, HomographyFindsPlanesAndRotations) {
 TEST(Robust, HopelessInputGivesNoModelOrAPoorOne) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  for (const ModelKind kind : {ModelKind::kFundamental, ModelKind::kHomography}) {
+  for (const ModelKind kind :
+       {ModelKind::kFundamental, ModelKind::kEssential, ModelKind::kHomography}) {
     RobustProblem problem;
     problem.kind = kind;
     problem.max_error = 4;

@@ -50,43 +50,86 @@ inline double RootBetween(const double* coefficients, int degree, double low, do
   return x;
 }
 
+// A polynomial by its coefficients of Bernstein: it has at most as many roots in the interval as
+// they have changes of sign, and one root if there is one change.
+template <int kDegree>
+using Bernstein = std::array<double, kDegree + 1>;
+
+// On -1 .. 1.
+template <int kDegree>
+Bernstein<kDegree> ToBernstein(const double* coefficients) {
+  static const auto table = [] {
+    std::array<std::array<double, kDegree + 1>, kDegree + 1> choose{};
+    for (std::size_t n = 0; n <= kDegree; ++n) {
+      choose[n][0] = choose[n][n] = 1;
+      for (std::size_t k = 1; k < n; ++k) choose[n][k] = choose[n - 1][k - 1] + choose[n - 1][k];
+    }
+    // Of x^k with x = 2 t - 1: the mean of the products of k of n factors, j of which are 1 and the
+    // others -1.
+    std::array<std::array<double, kDegree + 1>, kDegree + 1> powers{};
+    for (std::size_t j = 0; j <= kDegree; ++j) {
+      for (std::size_t k = 0; k <= kDegree; ++k) {
+        double sum = 0;
+        for (std::size_t i = 0; i <= k; ++i) {
+          if (i > j || k - i > kDegree - j) continue;
+          sum += ((k - i) % 2 == 0 ? 1 : -1) * choose[j][i] * choose[kDegree - j][k - i];
+        }
+        powers[k][j] = sum / choose[kDegree][k];
+      }
+    }
+    return powers;
+  }();
+  Bernstein<kDegree> result{};
+  for (std::size_t k = 0; k <= kDegree; ++k) {
+    for (std::size_t j = 0; j <= kDegree; ++j) result[j] += table[k][j] * coefficients[k];
+  }
+  return result;
+}
+
+template <int kDegree>
+int SignChanges(const Bernstein<kDegree>& bernstein) {
+  int num = 0;
+  for (std::size_t i = 0; i < kDegree; ++i) {
+    num += static_cast<int>((bernstein[i] < 0) != (bernstein[i + 1] < 0));
+  }
+  return num;
+}
+
+// Adds the roots within low .. high to *num ones.
+template <int kDegree>
+void AddRoots(const double* coefficients, Bernstein<kDegree> right, double low, double high,
+              int depth, std::array<double, kDegree>* roots, int* num) {
+  constexpr double kTolerance = 1e-14;
+  const int changes = SignChanges<kDegree>(right);
+  if (changes == 0 || *num == kDegree) return;
+  if (changes == 1) {
+    (*roots)[static_cast<std::size_t>((*num)++)] =
+        RootBetween(coefficients, kDegree, low, high, right[0] < 0, kTolerance);
+    return;
+  }
+  if (depth == 0) return;
+  // In two by de Casteljau, not in the middle: where roots are regular, one may be there.
+  constexpr double kPart = 0.53;
+  Bernstein<kDegree> left{};
+  for (std::size_t step = 0; step <= kDegree; ++step) {
+    left[step] = right[0];
+    for (std::size_t i = 0; i + step < kDegree; ++i) {
+      right[i] += kPart * (right[i + 1] - right[i]);
+    }
+  }
+  const double middle = low + kPart * (high - low);
+  AddRoots<kDegree>(coefficients, left, low, middle, depth - 1, roots, num);
+  AddRoots<kDegree>(coefficients, right, middle, high, depth - 1, roots, num);
+}
+
 // The roots within -1 .. 1 of a polynomial (the constant first), ascending, those of even
-// multiplicity left out; returns how many. The roots of a derivative part the line into intervals
-// in which there is at most one root of what it is the derivative of.
+// multiplicity and those that coincide but for some 1e-7 left out; returns how many.
 template <int kDegree>
 int RootsWithinOne(const double* coefficients, std::array<double, kDegree>* roots) {
-  // Derivatives, each divided by a factorial.
-  std::array<std::array<double, kDegree + 1>, kDegree> derivatives;
-  for (int i = 0; i <= kDegree; ++i) derivatives[0][static_cast<std::size_t>(i)] = coefficients[i];
-  for (std::size_t d = 1; d < kDegree; ++d) {
-    for (std::size_t i = 0; i + d <= kDegree; ++i) {
-      derivatives[d][i] =
-          derivatives[d - 1][i + 1] * static_cast<double>(i + 1) / static_cast<double>(d);
-    }
-  }
-  std::array<double, kDegree> parts{};  // Roots of the derivative before.
+  constexpr int kMaxDepth = 24;
   int num = 0;
-  for (int degree = 1; degree <= kDegree; ++degree) {
-    const double* polynomial = derivatives[static_cast<std::size_t>(kDegree - degree)].data();
-    const double tolerance = degree < kDegree ? 1e-7 : 1e-14;
-    std::array<double, kDegree> found{};
-    int num_found = 0;
-    double low = -1;
-    bool is_negative = Evaluate(polynomial, degree, low) < 0;
-    for (int i = 0; i <= num; ++i) {
-      const double high = i < num ? parts[static_cast<std::size_t>(i)] : 1;
-      const bool is_negative_at_high = Evaluate(polynomial, degree, high) < 0;
-      if (is_negative != is_negative_at_high) {
-        found[static_cast<std::size_t>(num_found++)] =
-            RootBetween(polynomial, degree, low, high, is_negative, tolerance);
-      }
-      low = high;
-      is_negative = is_negative_at_high;
-    }
-    parts = found;
-    num = num_found;
-  }
-  *roots = parts;
+  AddRoots<kDegree>(coefficients, ToBernstein<kDegree>(coefficients), -1, 1, kMaxDepth, roots,
+                    &num);
   return num;
 }
 

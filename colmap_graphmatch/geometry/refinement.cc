@@ -26,7 +26,7 @@ struct Factors {
 
 bool Factorize(const Eigen::Matrix3d& model, bool essential, Factors* factors) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(model, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d values = svd.singularValues();
+  const Eigen::Vector3d& values = svd.singularValues();
   if (!(values(1) > 0) || !values.allFinite()) return false;
   factors->u = svd.matrixU();
   factors->v = svd.matrixV();
