@@ -42,7 +42,8 @@ struct RobustModel {
 };
 
 // RANSAC (Fischler and Bolles, CACM 1981) with local optimisation (Chum, Matas and Kittler, DAGM
-// 2003) of every model that fits more matches than all before.
+// 2003) of every model that fits more matches than all before, or as many with smaller errors; and,
+// where none fits num_needed, of those to which a few are missing.
 RobustModel EstimateRobustly(const RobustProblem& problem, const PointPairs& pairs, Random* random);
 
 }  // namespace colmap_graphmatch

@@ -26,7 +26,8 @@ struct TwoViewOptions {
 };
 
 // What is known of two images. The pair's ids seed all random numbers: with the same input the
-// result is the same, bit for bit, on any thread and any processor of an architecture.
+// result is the same, bit for bit, on any number of threads and any processor of an architecture.
+// (Both functions below are thread-safe.)
 struct TwoViews {
   ImagePair pair;
   const Camera& camera1;
