@@ -774,7 +774,7 @@ INSTANTIATE_TEST_SUITE_P(Shards, ShardMatches,
 class ShardResults : public DatabaseTest {
  protected:
   std::vector<PairGeometry> Read() const {
-    return ReadShard(Path(), {{ImagePair(1, 2), {}}}, {{1, 10}, {2, 10}});
+    return ReadShard(Path(), {ImagePair(1, 2)}, {{1, 10}, {2, 10}});
   }
   void Result(const std::string& match_values, const std::string& geometry_values) const {
     const std::string id = std::to_string(EncodePair(ImagePair(1, 2)));

@@ -247,6 +247,10 @@ void Table::AddMatching() {
   Add("GraphMatching.matcher", OneOf(&p.verification.matcher, kMatcherWords),
       "exact: by this program; colmap: by COLMAP; auto: by COLMAP if it has a GPU and use_gpu is "
       "on, else exact");
+  Add("GraphMatching.verifier", OneOf(&p.verification.verifier, kVerifierWords),
+      "colmap: COLMAP's geometric verification; screened: the same, after a fast fit that settles "
+      "hopeless pairs and leaves COLMAP the likely matches; native: by this program, without "
+      "COLMAP");
   Add("GraphMatching.cache_gb", DoubleOf(&exact.cache_gb, Zero::kAllowed),
       "GB (>= 0) of descriptors kept in memory; 0: a quarter of the memory. Less reads images more "
       "often");

@@ -13,6 +13,10 @@ namespace {
 // The first schema in which an unset matrix is NULL and zeros would count as set (COLMAP 3.9).
 constexpr std::int64_t kFirstVersionWithNull = 3900;
 
+// COLMAP 4.2, the first that is known to store pairs with too few matches as degenerate instead of
+// undefined.
+constexpr std::int64_t kFirstVersionWithDegenerate = 4020000;
+
 const std::filesystem::path& ExistingFile(const std::filesystem::path& path) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
@@ -114,6 +118,9 @@ void Database::CheckSchema() {
 
   sqlite::Statement version(connection_, "PRAGMA user_version");
   version.Step();
+  if (version.Int(0) >= kFirstVersionWithDegenerate) {
+    unmatched_ = TwoViewConfiguration::kDegenerate;
+  }
   codec_ = TwoViewGeometryCodec(connection_.Columns("two_view_geometries"),
                                 version.Int(0) < kFirstVersionWithNull);
 }

@@ -84,7 +84,9 @@ class Database {
   // The same, judged by IsEdge.
   std::vector<VerifiedPair> ReadVerifiedPairs(std::size_t min_num_inliers);
 
-  // The inlier matches of a tested pair; none if it was not tested. Throws if they cannot be.
+  // The matches of a pair, and the inlier matches of a tested one; none if there is no such row.
+  // Throw if they cannot be.
+  FeatureMatches ReadMatches(const ImagePair& pair);
   FeatureMatches ReadInliers(const ImagePair& pair);
 
   // The number of matches of every pair that has a row in `matches`.
@@ -92,6 +94,9 @@ class Database {
 
   // The pairs that have matches, made elsewhere, and no two-view geometry yet, ascending.
   std::vector<ImagePair> ReadUnverifiedPairs();
+
+  // What COLMAPs that made databases like this one store for a pair with too few matches.
+  TwoViewConfiguration ConfigurationOfUnmatched() const { return unmatched_; }
 
   // Takes the write lock for a moment: that the database cannot be written should not be learnt
   // late.
@@ -110,6 +115,7 @@ class Database {
 
  private:
   void CheckSchema();
+  FeatureMatches ReadMatchesFrom(const std::string& table, const ImagePair& pair);
   // Throws if these are not all features of the image.
   void CheckNumber(std::size_t num_rows, const ImageRecord& image) const;
   // Whether the features of an image have this fingerprint.
@@ -122,6 +128,7 @@ class Database {
   sqlite::Connection connection_;
   TwoViewGeometryCodec codec_{{}, false};
   bool cameras_have_prior_ = false;
+  TwoViewConfiguration unmatched_ = TwoViewConfiguration::kUndefined;
   bool descriptors_have_type_ = false;
   bool pages_are_checked_ = false;
 

@@ -47,19 +47,27 @@ std::vector<VerifiedPair> Database::ReadVerifiedPairs(std::size_t min_num_inlier
   return pairs;
 }
 
+FeatureMatches Database::ReadMatches(const ImagePair& pair) {
+  return ReadMatchesFrom("matches", pair);
+}
+
 FeatureMatches Database::ReadInliers(const ImagePair& pair) {
+  return ReadMatchesFrom("two_view_geometries", pair);
+}
+
+FeatureMatches Database::ReadMatchesFrom(const std::string& table, const ImagePair& pair) {
   const auto num_features = [this](ImageId id) {
     sqlite::Statement select(connection_, "SELECT rows FROM keypoints WHERE image_id = ?1");
     const bool found = select.Bind(1, std::int64_t{id}).Step();
     return found ? static_cast<std::size_t>(std::max<std::int64_t>(0, select.Int(0))) : 0;
   };
   sqlite::Statement select(connection_,
-                           "SELECT rows, cols, data FROM two_view_geometries WHERE pair_id = ?1");
+                           "SELECT rows, cols, data FROM " + table + " WHERE pair_id = ?1");
   if (!select.Bind(1, static_cast<std::int64_t>(EncodePair(pair))).Step()) return {};
   try {
     return DecodeMatches(select, 0, num_features(pair.id1), num_features(pair.id2));
   } catch (const DatabaseError& error) {
-    throw DatabaseError("The inlier matches that " + Path().string() +
+    throw DatabaseError("The matches in the table " + table + " that " + Path().string() +
                         " has for the images with ids " + std::to_string(pair.id1) + " and " +
                         std::to_string(pair.id2) + " contain " + error.what() +
                         ". Were features extracted again after matching? Delete the rows of "

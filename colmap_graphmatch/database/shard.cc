@@ -121,7 +121,7 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
 }
 
 std::vector<PairGeometry> ReadShard(const std::filesystem::path& shard_path,
-                                    const std::vector<ShardPair>& pairs,
+                                    const std::vector<ImagePair>& pairs,
                                     const std::map<ImageId, std::size_t>& num_features) {
   sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, 0);
   const TwoViewGeometryCodec codec(shard.Columns("two_view_geometries"), false);
@@ -132,8 +132,7 @@ std::vector<PairGeometry> ReadShard(const std::filesystem::path& shard_path,
 
   std::vector<PairGeometry> results;
   results.reserve(pairs.size());
-  for (const ShardPair& shard_pair : pairs) {
-    const ImagePair& pair = shard_pair.pair;
+  for (const ImagePair& pair : pairs) {
     const auto pair_id = static_cast<std::int64_t>(EncodePair(pair));
     PairGeometry result;
     result.pair = pair;

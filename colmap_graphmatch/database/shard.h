@@ -38,7 +38,7 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
 // one that cannot be: wrong sizes, features that the images do not have (num_features, by image),
 // unknown configurations.
 std::vector<PairGeometry> ReadShard(const std::filesystem::path& shard_path,
-                                    const std::vector<ShardPair>& pairs,
+                                    const std::vector<ImagePair>& pairs,
                                     const std::map<ImageId, std::size_t>& num_features);
 
 }  // namespace colmap_graphmatch

@@ -23,6 +23,7 @@
 #include "colmap_graphmatch/pipeline/strategy.h"
 #include "colmap_graphmatch/pipeline/test_log.h"
 #include "colmap_graphmatch/pipeline/timed.h"
+#include "colmap_graphmatch/verification/chosen_verifier.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 
@@ -278,23 +279,35 @@ void Pipeline::KeepDetails(const PairVerifier& verifier, const std::vector<Image
 void Pipeline::MatchAndVerify() {
   const auto warn = [this](const std::string& warning) { observer_.OnWarning(warning); };
   const WorkDirectory work(options_.work_path, WorkDirectory::Guard::kGuarded);
-  const ColmapInstallation colmap = DetectColmap(options_.colmap_path, work.Path(), stop_);
   VerificationOptions verification = options_.verification;
   verification.num_threads = options_.num_threads;
-  const VerificationPlan plan = PlanVerification(verification, colmap);
-  ColmapVerifier geometry(verification, colmap, database_->Path(), images_, work.Path(), stop_,
+  std::optional<ColmapInstallation> colmap;
+  if (verification.verifier != VerificationOptions::Verifier::kNative) {
+    colmap = DetectColmap(options_.colmap_path, work.Path(), stop_);
+  }
+  const VerificationPlan plan =
+      PlanVerification(verification, colmap.value_or(ColmapInstallation()));
+  ChosenVerifier geometry(verification, plan, colmap, *database_, images_, work.Path(), stop_,
                           warn);
-  BatchVerifier verifier(verification, plan, geometry, *database_, images_, stop_, warn);
+  BatchVerifier verifier(verification, plan, geometry.Get(), *database_, images_, stop_, warn);
   observer_.OnInfo(
       std::string("Descriptors are matched ") +
       (plan.matches_here ? std::string("exactly, with ") + TopTwoTarget() + "." : "by COLMAP."));
-  observer_.OnInfo("COLMAP " + colmap.Version() + " at " + colmap.executable.string() + ", " +
-                   (plan.uses_gpu ? "GPU" : "CPU") +
-                   ", processes: " + std::to_string(plan.num_processes) +
-                   ", threads in each: " + std::to_string(plan.threads_per_process) + ".");
+  if (colmap) {
+    observer_.OnInfo("COLMAP " + colmap->Version() + " at " + colmap->executable.string() + ", " +
+                     (plan.uses_gpu ? "GPU" : "CPU") +
+                     ", processes: " + std::to_string(plan.num_processes) +
+                     ", threads in each: " + std::to_string(plan.threads_per_process) + ".");
+  }
+  using Verifier = VerificationOptions::Verifier;
+  observer_.OnInfo(plan.verifier == Verifier::kNative ? "Pairs are verified by this program."
+                   : plan.verifier == Verifier::kScreened
+                       ? "Pairs are verified by COLMAP, after a fast fit."
+                       : "Pairs are verified by COLMAP.");
   ExploreWith(verifier);
   result_.descriptor_matching = verifier.Statistics();
-  result_.colmap = geometry.SoFar();
+  result_.colmap = geometry.Colmap();
+  result_.screening = geometry.Screening();
   database_->CheckInPlace();
 }
 

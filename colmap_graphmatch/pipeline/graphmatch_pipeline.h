@@ -19,6 +19,7 @@
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 #include "colmap_graphmatch/verification/options.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
+#include "colmap_graphmatch/verification/screened_verifier.h"
 
 namespace colmap_graphmatch {
 
@@ -109,7 +110,8 @@ struct PipelineResult {
   bool listed = false;  // The pairs were given, all or a list: no sampling, no propagation.
   ExplorationResult matching;
   MatchingStatistics descriptor_matching;  // Without a replay:
-  ColmapVerifier::Statistics colmap;       // what verification took.
+  ColmapVerifier::Statistics colmap;       // what verification took,
+  ScreenedVerifier::Statistics screening;  // and the fits before it.
   int num_threads = 1;
   bool replayed = false;
   ImageRankingSeconds preprocessing_seconds;

@@ -7,6 +7,7 @@
 #include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/matching/pair_order.h"
 #include "colmap_graphmatch/verification/fault_isolation.h"
+#include "colmap_graphmatch/verification/points.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -58,14 +59,19 @@ BatchVerifier::BatchVerifier(const VerificationOptions& options, const Verificat
       stop_(stop),
       on_warning_(on_warning),
       runner_(static_cast<std::size_t>(plan.num_processes), stop) {
-  for (const ImageRecord& image : images) names_.emplace(image.id, image.name);
+  for (const ImageRecord& image : images) images_.emplace(image.id, image);
   known_ = database.ReadVerifiedPairs(static_cast<std::size_t>(options.geometry.min_num_inliers));
   if (!plan.matches_here) return;
-  exact_matcher_ =
-      std::make_unique<ExactMatcher>(options.exact, ExactMatcher::Points::kLeftOut, database.Path(),
-                                     images, sqlite::LockPatience(options.lock_timeout, &stop),
-                                     static_cast<std::size_t>(plan.num_processes));
+  exact_matcher_ = std::make_unique<ExactMatcher>(
+      options.exact,
+      geometry.NeedsPoints() ? ExactMatcher::Points::kGiven : ExactMatcher::Points::kLeftOut,
+      database.Path(), images, sqlite::LockPatience(options.lock_timeout, &stop),
+      static_cast<std::size_t>(plan.num_processes));
   unverified_ = database.ReadUnverifiedPairs();
+  if (geometry.NeedsPoints() && !unverified_.empty()) {
+    reader_.emplace(database.Path(), sqlite::Access::kRead,
+                    sqlite::LockPatience(options.lock_timeout, &stop));
+  }
   WarnOfCutFeatures(images);
 }
 
@@ -113,14 +119,14 @@ void BatchVerifier::CheckThatItWorks(const ShardPart& part) {
   }
 }
 
-std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
-                                            ShardRunner::Progress& progress) {
-  std::vector<ShardPair> to_verify;
+std::vector<PairToVerify> BatchVerifier::Match(const ShardRunner::Shard& pairs,
+                                               ShardRunner::Progress& progress) {
+  std::vector<PairToVerify> to_verify;
   std::vector<ImagePair> to_match;
   for (const ImagePair& pair : pairs) {
     const bool has_matches = std::binary_search(unverified_.begin(), unverified_.end(), pair);
     if (exact_matcher_ == nullptr || has_matches) {
-      to_verify.push_back({pair, std::nullopt});
+      to_verify.push_back(reader_ ? ReadPair(pair) : PairToVerify{pair, std::nullopt});
     } else {
       to_match.push_back(pair);
     }
@@ -141,7 +147,8 @@ std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
       result.geometry.configuration = geometry_.ConfigurationOfUnmatched();
       unmatched.results.push_back(std::move(result));
     } else {
-      to_verify.push_back({to_match[i], std::move(matched[i].matches)});
+      to_verify.push_back({to_match[i], std::move(matched[i].matches), std::move(matched[i].points),
+                           std::move(matched[i].distinctness)});
     }
   }
   {
@@ -153,8 +160,18 @@ std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
   return to_verify;
 }
 
+PairToVerify BatchVerifier::ReadPair(const ImagePair& pair) {
+  const std::lock_guard<std::mutex> lock(reading_);
+  PairToVerify read{pair, reader_->ReadMatches(pair)};
+  const auto positions_of = [this](ImageId image) {
+    return PositionsOf(reader_->ReadKeypoints(images_.at(image)));
+  };
+  read.points = PointsOf(*read.matches, positions_of(pair.id1), positions_of(pair.id2));
+  return read;
+}
+
 void BatchVerifier::Work(const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
-  const std::vector<ShardPair> to_verify = Match(shard, progress);
+  const std::vector<PairToVerify> to_verify = Match(shard, progress);
   const auto size = static_cast<std::size_t>(options_.max_pairs_per_shard);
   for (std::size_t first = 0; first < to_verify.size(); first += size) {
     if (first > 0 && stop_.Requested()) break;
@@ -240,8 +257,8 @@ bool BatchVerifier::Verify(const std::vector<ImagePair>& pairs,
       on_verified(written[i]);
     }
     for (const auto& [pair, problem] : part.failures) {
-      on_warning_("COLMAP failed on the pair \"" + names_.at(pair.id1) + "\" and \"" +
-                  names_.at(pair.id2) + "\", which stays untested. It " + problem);
+      on_warning_("COLMAP failed on the pair \"" + images_.at(pair.id1).name + "\" and \"" +
+                  images_.at(pair.id2).name + "\", which stays untested. It " + problem);
       --num_unanswered;
       ++num_failed_;
       on_verified({pair, PairOutcome::kFailed, 0});

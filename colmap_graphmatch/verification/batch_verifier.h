@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -62,7 +63,9 @@ class BatchVerifier : public PairVerifier {
   // What a worker does with a shard.
   void Work(const ShardRunner::Shard& shard, ShardRunner::Progress& progress);
   // Matches the pairs here. Those with too few matches are finished; returns the others.
-  std::vector<ShardPair> Match(const ShardRunner::Shard& pairs, ShardRunner::Progress& progress);
+  std::vector<PairToVerify> Match(const ShardRunner::Shard& pairs, ShardRunner::Progress& progress);
+  // With the matches and points that the database has.
+  PairToVerify ReadPair(const ImagePair& pair);
   // Writes results to the database and returns what it has of these pairs from then on.
   std::vector<VerifiedPair> Write(const std::vector<PairGeometry>& results);
   // Throws ColmapError once verification has failed on pairs that have nothing in common.
@@ -72,7 +75,6 @@ class BatchVerifier : public PairVerifier {
   VerificationOptions options_;
   GeometryVerifier& geometry_;
   Database& database_;
-  std::map<ImageId, std::string> names_;
   const StopRequest& stop_;
   std::function<void(const std::string&)> on_warning_;
   ShardRunner runner_;
@@ -85,6 +87,10 @@ class BatchVerifier : public PairVerifier {
   std::set<ImageId> failing_images_;
   bool has_verified_ = false;
   std::size_t num_failed_ = 0;
+
+  std::mutex reading_;              // Of the database by workers.
+  std::optional<Database> reader_;  // None if nobody needs points.
+  std::map<ImageId, ImageRecord> images_;
 
   std::mutex mutex_;  // Of what workers add to.
   double matching_seconds_ = 0;

@@ -4,9 +4,11 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <tuple>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/shard.h"
 #include "colmap_graphmatch/verification/colmap_arguments.h"
 #include "colmap_graphmatch/verification/subprocess.h"
 #include "colmap_graphmatch/verification/work_directory.h"
@@ -47,6 +49,7 @@ ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const ColmapI
   shards_have_descriptors_ =
       !plan_.matches_here || options.geometry.guided_matching.value_or(false);
   arguments_ = FindArguments(on_warning);
+  arguments_for_few_trials_ = ArgumentsForFewTrials();
   MakeTemplate();
 }
 
@@ -67,6 +70,22 @@ std::vector<std::string> ColmapVerifier::FindArguments(
                " does not have these options, which have no effect: " + names + ".");
   }
   return arguments;
+}
+
+std::vector<std::string> ColmapVerifier::ArgumentsForFewTrials() const {
+  // COLMAP's least number of trials, to which it raises all others.
+  constexpr int kFewTrials = 100;
+  // Seven of seven matches are inliers in every fifth trial then.
+  constexpr double kInlierRatio = 0.8;
+  VerificationOptions options = options_;
+  GeometryOptions& geometry = options.geometry;
+  geometry.max_num_trials = std::min(kFewTrials, geometry.max_num_trials.value_or(kFewTrials));
+  // Later versions reject pairs with a smaller share.
+  const bool is_budget =
+      std::make_tuple(colmap_.major, colmap_.minor, colmap_.patch) <= std::make_tuple(4, 2, 1);
+  if (is_budget) geometry.min_inlier_ratio = kInlierRatio;
+  std::vector<std::string> unknown;  // They were warned of.
+  return colmap_.Arguments(ColmapOptions(options, plan_), &unknown);
 }
 
 void ColmapVerifier::MakeTemplate() const {
@@ -110,22 +129,27 @@ double ColmapVerifier::Timeout(std::size_t num_pairs) const {
 }
 
 std::map<ImageId, std::size_t> ColmapVerifier::NumFeatures(
-    const std::vector<ShardPair>& pairs) const {
+    const std::vector<PairToVerify>& pairs) const {
   std::map<ImageId, std::size_t> num_features;
-  for (const auto& [pair, matches] : pairs) {
-    num_features[pair.id1] = num_features_.at(pair.id1);
-    num_features[pair.id2] = num_features_.at(pair.id2);
+  for (const PairToVerify& asked : pairs) {
+    for (const ImageId id : {asked.pair.id1, asked.pair.id2}) {
+      num_features[id] = num_features_.at(id);
+    }
   }
   return num_features;
 }
 
 std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& directory,
-                                                   const std::vector<ShardPair>& pairs) const {
+                                                   const std::vector<PairToVerify>& pairs,
+                                                   Trials trials) const {
   const std::filesystem::path shard_path = directory / "database.db";
   const std::filesystem::path list_path = directory / "pairs.txt";
   try {
     std::filesystem::copy_file(template_path_, shard_path);
-    FillShard(shard_path, database_path_, {options_.lock_timeout, &stop_}, pairs,
+    std::vector<ShardPair> rows;
+    rows.reserve(pairs.size());
+    for (const PairToVerify& pair : pairs) rows.push_back({pair.pair, pair.matches});
+    FillShard(shard_path, database_path_, {options_.lock_timeout, &stop_}, rows,
               shards_have_descriptors_);
   } catch (const std::filesystem::filesystem_error& error) {
     ThrowIfUnusable(work_path_);
@@ -136,8 +160,8 @@ std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& 
     throw;
   }
   std::ofstream list(list_path);
-  for (const auto& [pair, matches] : pairs) {
-    list << ShardImageName(pair.id1) << ' ' << ShardImageName(pair.id2) << '\n';
+  for (const PairToVerify& asked : pairs) {
+    list << ShardImageName(asked.pair.id1) << ' ' << ShardImageName(asked.pair.id2) << '\n';
   }
   list.close();
   if (!list) ThrowIfUnusable(work_path_);
@@ -146,16 +170,18 @@ std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& 
   std::vector<std::string> command = {
       colmap_.executable.string(), "matches_importer", "--database_path", shard_path.string(),
       "--match_list_path",         list_path.string(), "--match_type",    "pairs"};
-  command.insert(command.end(), arguments_.begin(), arguments_.end());
+  const std::vector<std::string>& arguments =
+      trials == Trials::kFew ? arguments_for_few_trials_ : arguments_;
+  command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }
 
-ShardOutcome ColmapVerifier::Verify(const std::vector<ShardPair>& pairs,
+ShardOutcome ColmapVerifier::Verify(const std::vector<PairToVerify>& pairs, Trials trials,
                                     const std::function<bool()>& should_stop) {
   const WorkDirectory directory(work_path_);
   const std::filesystem::path output_path = directory.Path() / "output.txt";
-  const SubprocessResult run = RunSubprocess(MakeShard(directory.Path(), pairs), output_path,
-                                             Timeout(pairs.size()), should_stop);
+  const SubprocessResult run = RunSubprocess(MakeShard(directory.Path(), pairs, trials),
+                                             output_path, Timeout(pairs.size()), should_stop);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     statistics_.seconds += run.seconds;
@@ -175,7 +201,9 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<ShardPair>& pairs,
     outcome.problem = run.Describe() + ":\n" + last_lines;
   } else {
     try {
-      outcome.results = ReadShard(directory.Path() / "database.db", pairs, NumFeatures(pairs));
+      std::vector<ImagePair> asked;
+      for (const PairToVerify& pair : pairs) asked.push_back(pair.pair);
+      outcome.results = ReadShard(directory.Path() / "database.db", asked, NumFeatures(pairs));
     } catch (const DatabaseError& error) {
       outcome.problem = std::string("ended without an error, but: ") + error.what() + "\n" +
                         LastLines(output_path, kNumLastLines);

@@ -1,13 +1,23 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "colmap_graphmatch/database/database.h"
-#include "colmap_graphmatch/database/shard.h"
+#include "colmap_graphmatch/base/two_view_geometry.h"
+#include "colmap_graphmatch/base/types.h"
 
 namespace colmap_graphmatch {
+
+struct PairToVerify {
+  ImagePair pair;
+  // None: those that the database has, or, if COLMAP matches, its own.
+  std::optional<FeatureMatches> matches;
+  // Of the matches, for a verifier that needs points.
+  std::vector<PointPair> points = {};
+  std::vector<float> distinctness = {};  // See DescriptorMatcher; empty if it is not known.
+};
 
 // What became of a shard that a GeometryVerifier was given.
 struct ShardOutcome {
@@ -23,9 +33,12 @@ class GeometryVerifier {
  public:
   virtual ~GeometryVerifier() = default;
 
+  // Whether pairs are to be given with their points.
+  virtual bool NeedsPoints() const { return false; }
+
   // should_stop is asked often. Throws SystemLimitError if the system lacks what it takes for now,
   // StoppedError, and DatabaseError or FileError if it cannot go on.
-  virtual ShardOutcome Verify(const std::vector<ShardPair>& pairs,
+  virtual ShardOutcome Verify(const std::vector<PairToVerify>& pairs,
                               const std::function<bool()>& should_stop) = 0;
 
   // For a pair with too few matches to be given to Verify.

@@ -5,6 +5,7 @@
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/verification/colmap_arguments.h"
+#include "colmap_graphmatch/verification/in_process.h"
 
 namespace colmap_graphmatch {
 
@@ -12,6 +13,17 @@ void VerificationOptions::Check() const {
   EffectiveNumThreads(num_threads);
   exact.Check();
   geometry.Check();
+  if (verifier == Verifier::kNative && NeedsColmap(geometry)) {
+    throw OptionsError(
+        "Only COLMAP has guided_matching, multiple_models, planar_scene and "
+        "filter_stationary_matches: leave them out, or have COLMAP verify (verifier screened or "
+        "colmap).");
+  }
+  if (verifier == Verifier::kNative && matcher == Matcher::kColmap) {
+    throw OptionsError(
+        "What is verified natively is matched here, too: matcher colmap and "
+        "verifier native contradict each other.");
+  }
   CheckOwners(colmap_options);
   if (num_processes < 0) {
     throw OptionsError("The number of COLMAP processes must be positive, or 0 to have it chosen.");
@@ -25,11 +37,15 @@ VerificationPlan PlanVerification(const VerificationOptions& options,
                                   const ColmapInstallation& colmap) {
   options.Check();
   using Matcher = VerificationOptions::Matcher;
+  using Verifier = VerificationOptions::Verifier;
   const bool gpu = options.use_gpu && colmap.has_gpu;
   VerificationPlan plan;
   plan.matches_here =
       options.matcher == Matcher::kExact || (options.matcher == Matcher::kAuto && !gpu);
+  if (options.verifier == Verifier::kNative) plan.matches_here = true;
   plan.uses_gpu = gpu && !plan.matches_here;
+  const bool in_process = plan.matches_here && !NeedsColmap(options.geometry);
+  plan.verifier = in_process ? options.verifier : Verifier::kColmap;
   const int num_threads = EffectiveNumThreads(options.num_threads);
   plan.num_processes = options.num_processes > 0 ? options.num_processes
                        : plan.uses_gpu           ? 1

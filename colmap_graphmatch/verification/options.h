@@ -16,6 +16,12 @@ struct VerificationOptions {
   enum class Matcher { kAuto, kExact, kColmap };
   Matcher matcher = Matcher::kAuto;
 
+  // Who decides whether a pair is an edge. kColmap: COLMAP alone. kScreened: the same, but a fast
+  // fit goes first (screened_verifier.h). kNative: this library (native_verifier.h). Where COLMAP
+  // matches, it also verifies.
+  enum class Verifier { kScreened, kColmap, kNative };
+  Verifier verifier = Verifier::kColmap;
+
   ExactMatcherOptions exact;
 
   // The cores that all COLMAP processes together may use; -1: all.
@@ -56,11 +62,17 @@ inline constexpr EnumWords<VerificationOptions::Matcher, 3> kMatcherWords = {
      {VerificationOptions::Matcher::kExact, "exact"},
      {VerificationOptions::Matcher::kColmap, "colmap"}}};
 
+inline constexpr EnumWords<VerificationOptions::Verifier, 3> kVerifierWords = {
+    {{VerificationOptions::Verifier::kScreened, "screened"},
+     {VerificationOptions::Verifier::kColmap, "colmap"},
+     {VerificationOptions::Verifier::kNative, "native"}}};
+
 // What the options come to with the COLMAP that is installed.
 struct VerificationPlan {
   bool matches_here = true;  // Descriptors, by this library.
   bool uses_gpu = false;     // COLMAP does.
-  int num_processes = 1;     // Of COLMAP, at a time,
+  VerificationOptions::Verifier verifier = VerificationOptions::Verifier::kColmap;
+  int num_processes = 1;  // Of COLMAP, at a time,
   int threads_per_process = 1;
 };
 

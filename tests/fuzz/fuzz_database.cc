@@ -88,7 +88,9 @@ class Fuzzer {
           num_features[pair.pair.id1] = 10;
           num_features[pair.pair.id2] = 10;
         }
-        ReadShard(shard, pairs, num_features);
+        std::vector<ImagePair> asked;
+        for (const ShardPair& pair : pairs) asked.push_back(pair.pair);
+        ReadShard(shard, asked, num_features);
       });
     }
     PairGeometry result;
