@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <fstream>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,31 @@ TEST(OptionTable, EveryRowTakesItsDefaultAndRefusesWhatItMustNotBe) {
   }
 }
 
+TEST(Help, ShowsTheTenThatAreUsedMostOnOneScreenAndAllOnDemand) {
+  std::ostringstream common;
+  PrintHelp(common);
+  std::ostringstream all;
+  PrintFullHelp(all);
+  EXPECT_THAT(common.str(), HasSubstr("--help-all"));
+  CommandLine line;
+  int count = 0;
+  for (const OptionRow& row : MakeOptionTable(&line)) {
+    const std::string option = "\n  --" + row.name + " ";
+    EXPECT_EQ(common.str().find(option) != std::string::npos, row.is_common) << row.name;
+    const bool has_effect = row.use != OptionRow::Use::kUnused && row.name != "help";
+    EXPECT_EQ(all.str().find(option) != std::string::npos, has_effect) << row.name;
+    count += row.is_common ? 1 : 0;
+  }
+  EXPECT_EQ(count, 10);
+}
+
+TEST(Help, IsAskedForUnderThreeNames) {
+  EXPECT_TRUE(Parse({"-h"}).help);
+  EXPECT_TRUE(Parse({"--help"}).help);
+  EXPECT_FALSE(Parse({"--help"}).help_all);
+  EXPECT_TRUE(Parse({"--help-all"}).help_all);
+}
+
 // What shells complete.
 TEST(OptionTable, TellsChoicesAndPaths) {
   CommandLine line;
@@ -111,12 +137,11 @@ TEST(Options, EverySpellingOfAnOptionMeansTheSame) {
     const CommandLine line =
         Parse({prefix + ".max_error", "3", prefix + ".max_ratio", "0.7", prefix + ".num_threads",
                "2", prefix + ".use_gpu", "false", prefix + ".min_num_inliers", "20"});
-    EXPECT_THAT(line.pipeline.verification.colmap_options,
-                ElementsAre(Pair("TwoViewGeometry.max_error", "3")));
+    EXPECT_EQ(line.pipeline.verification.geometry.max_error, 3);
     EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
     EXPECT_EQ(line.pipeline.num_threads, 2);
     EXPECT_FALSE(line.pipeline.verification.use_gpu);
-    EXPECT_EQ(line.pipeline.verification.min_num_inliers, 20);
+    EXPECT_EQ(line.pipeline.verification.geometry.min_num_inliers, 20);
   }
 }
 
@@ -491,14 +516,12 @@ TEST_F(ProjectTest, TheCommandLineGoesBeforeInAnySpelling) {
       "[SiftMatching]\nmax_error=3\nmax_ratio=0.7\n[VocabTreeMatching]\nnum_images=30\n"
       "vocab_tree_path=\n[Mapper]\nmin_num_matches=x\n");
   CommandLine line = Parse(arguments);
-  EXPECT_THAT(line.pipeline.verification.colmap_options,
-              ElementsAre(Pair("TwoViewGeometry.max_error", "3")));
+  EXPECT_EQ(line.pipeline.verification.geometry.max_error, 3);
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 30);
   arguments.insert(arguments.end(),
                    {"--TwoViewGeometry.max_error", "5", "--GraphMatching.max_num_neighbors", "40"});
   line = Parse(arguments);
-  EXPECT_THAT(line.pipeline.verification.colmap_options,
-              ElementsAre(Pair("TwoViewGeometry.max_error", "5")));
+  EXPECT_EQ(line.pipeline.verification.geometry.max_error, 5);
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 40);
   EXPECT_EQ(line.pipeline.verification.exact.matching.max_ratio, 0.7);
 }

@@ -38,6 +38,9 @@ def read_options():
         if line.startswith("## "):
             has_effect = line != "## Accepted without effect"
         row = re.match(r"\| `([^`]+)` \| ([^|]*) \|", line)
+        unused = re.match(r"  `([^`]+)`$", line)
+        if unused:
+            options.append(Option(unused[1], "", has_effect, []))
         if row:
             options.append(Option(row[1], row[2], has_effect, re.findall(r"[0-9]: `([^`]+)`", line)))
     return options

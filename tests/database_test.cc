@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -26,6 +27,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 constexpr double kLockTimeout = 0.2;
@@ -68,18 +70,16 @@ class DatabaseTest : public ::testing::Test {
   TestDirectory directory_;
 };
 
-PairRows MakeRows(ImagePair pair, std::uint32_t num_inliers) {
-  PairRows rows;
-  rows.pair = pair;
-  rows.num_matches = num_inliers;
-  for (std::uint32_t i = 0; i < 2 * num_inliers; ++i) {
-    rows.matches.insert(rows.matches.end(), {static_cast<std::uint8_t>(i / 2), 0, 0, 0});
-  }
-  rows.num_inliers = num_inliers;
-  rows.inliers = rows.matches;
-  rows.config = num_inliers > 0 ? 3 : 0;
-  return rows;
+PairGeometry MakeRows(ImagePair pair, std::uint32_t num_inliers) {
+  PairGeometry result;
+  result.pair = pair;
+  for (std::uint32_t i = 0; i < num_inliers; ++i) result.matches.push_back({i, i});
+  result.geometry.inliers = result.matches;
+  if (num_inliers > 0) result.geometry.configuration = TwoViewConfiguration::kUncalibrated;
+  return result;
 }
+
+Matrix3 MatrixOf(double first) { return {first, 2, 3, 4, 5, 6, 7, 8, 9}; }
 
 class AnySchema : public DatabaseTest, public ::testing::WithParamInterface<Schema> {};
 
@@ -103,9 +103,8 @@ TEST_P(AnySchema, ReadsImagesAndFeatures) {
 TEST_P(AnySchema, WritesPairsAndReadsThemBack) {
   Write(GetParam());
   Database database = Open();
-  PairRows edge = MakeRows(ImagePair(1, 2), 20);
-  edge.geometry[0] = sqlite::Blob(72, 9);
-  edge.geometry[1] = sqlite::Blob(72, 0);
+  PairGeometry edge = MakeRows(ImagePair(1, 2), 20);
+  edge.geometry.F = MatrixOf(1);
   database.WritePairs({edge, MakeRows(ImagePair(4, 3), 0)});
   const std::vector<TestedPair> tested = database.ReadTestedPairs();
   ASSERT_THAT(tested, SizeIs(2));
@@ -125,10 +124,9 @@ TEST_P(AnySchema, WritesPairsAndReadsThemBack) {
 TEST_P(AnySchema, MarksUnsetMatricesAsThatVersionDoes) {
   Write(GetParam());
   Database database = Open();
-  PairRows edge = MakeRows(ImagePair(1, 2), 20);
-  edge.geometry[0] = sqlite::Blob(72, 9);
-  edge.geometry[1] = sqlite::Blob(72, 0);  // As COLMAP 3.8 writes it.
-  database.WritePairs({edge});             // H, qvec and tvec as later versions do.
+  PairGeometry edge = MakeRows(ImagePair(1, 2), 20);
+  edge.geometry.F = MatrixOf(1);
+  database.WritePairs({edge});
   const bool zeros = GetParam() == Schema::kColmap38;
   EXPECT_EQ(Query("SELECT E = zeroblob(72) AND H = zeroblob(72) AND qvec = zeroblob(32) AND tvec = "
                   "zeroblob(24) FROM two_view_geometries"),
@@ -142,39 +140,81 @@ TEST_P(AnySchema, KeepsAPoseWithoutTranslationWhole) {
   // COLMAP 4 refuses half a pose.
   Write(GetParam());
   Database database = Open();
-  PairRows edge = MakeRows(ImagePair(1, 2), 20);
-  edge.geometry[3] = sqlite::Blob(32, 0);
-  (*edge.geometry[3])[7] = 0x3F;
-  edge.geometry[4] = sqlite::Blob(24, 0);
+  PairGeometry edge = MakeRows(ImagePair(1, 2), 20);
+  edge.geometry.pose = RelativePose{{0.5, 0.5, 0.5, 0.5}, {0, 0, 0}};
   database.WritePairs({edge});
   EXPECT_EQ(Query("SELECT length(qvec) = 32 AND tvec = zeroblob(24) FROM two_view_geometries"), 1);
 }
 
-TEST_P(AnySchema, TakesTheIdentityForAPoseThatIsNotSet) {
-  // COLMAP 3.9 to 3.13 write it where no relative pose was asked for; COLMAP 4 would take it for
-  // one. 3.8 writes zeros of either sign.
+TEST_P(AnySchema, ReadsBackWhatItWrote) {
   Write(GetParam());
+  PairGeometry edge = MakeRows(ImagePair(1, 2), 5);
+  edge.geometry.configuration = TwoViewConfiguration::kPlanar;
+  edge.geometry.F = MatrixOf(-0.0);
+  edge.geometry.E = MatrixOf(0.1);
+  edge.geometry.pose = RelativePose{{0.5, -0.5, 0.5, 0.5}, {1, 0, -2}};
+  if (GetParam() == Schema::kColmap42) edge.geometry.cameras[1] = sqlite::Blob(40, 7);
+  {
+    Database database = Open();
+    database.WritePairs({edge});
+    EXPECT_EQ(database.ReadInliers(ImagePair(1, 2)), edge.geometry.inliers);
+    EXPECT_THAT(database.ReadInliers(ImagePair(1, 3)), IsEmpty());
+  }
+  sqlite::Connection connection(Path(), sqlite::Access::kRead, kLockTimeout);
+  const TwoViewGeometryCodec codec(connection.Columns("two_view_geometries"), false);
+  sqlite::Statement select(connection,
+                           "SELECT " + JoinColumns(codec.Columns()) + " FROM two_view_geometries");
+  ASSERT_TRUE(select.Step());
+  const TwoViewGeometry read = codec.Decode(select, 0, 10, 10);
+  EXPECT_EQ(read.configuration, TwoViewConfiguration::kPlanar);
+  EXPECT_EQ(read.inliers, edge.geometry.inliers);
+  EXPECT_EQ(read.F, edge.geometry.F);
+  EXPECT_EQ(read.E, edge.geometry.E);
+  EXPECT_EQ(read.H, std::nullopt);
+  ASSERT_TRUE(read.pose.has_value());
+  EXPECT_EQ(read.pose->rotation, edge.geometry.pose->rotation);
+  EXPECT_EQ(read.pose->translation, edge.geometry.pose->translation);
+  EXPECT_EQ(read.cameras, edge.geometry.cameras);
+}
+
+TEST_F(DatabaseTest, InliersOfFeaturesThatAreGone) {
+  Write();
   Database database = Open();
-  PairRows identity = MakeRows(ImagePair(1, 2), 20);
-  const auto blob = [](const std::vector<double>& values) {
-    const auto* bytes = reinterpret_cast<const std::uint8_t*>(values.data());
-    return sqlite::Blob(bytes, bytes + values.size() * sizeof(double));
+  database.WritePairs({MakeRows(ImagePair(1, 2), 5)});
+  Execute("UPDATE keypoints SET rows = 3 WHERE image_id = 2");
+  EXPECT_THAT(MessageOf([&] { database.ReadInliers(ImagePair(1, 2)); }),
+              AllOf(HasSubstr("ids 1 and 2"), HasSubstr("extracted again")));
+}
+
+TEST_P(AnySchema, ReadsCameras) {
+  Write(GetParam());
+  Execute(
+      "UPDATE cameras SET model = 2, width = 640, height = 480, prior_focal_length = 1, params "
+      "= CAST(x'0000000000408F400000000000007440000000000000E0BF9A9999999999B93F' AS BLOB)");
+  const std::vector<ImageRecord> images = Open().ReadImages();
+  const std::map<CameraId, Camera> cameras = Open().ReadCameras();
+  const Camera& camera = cameras.at(images.front().camera_id);
+  EXPECT_EQ(camera.id, images.front().camera_id);
+  EXPECT_EQ(camera.model_id, 2);
+  EXPECT_EQ(camera.width, 640);
+  EXPECT_EQ(camera.height, 480);
+  EXPECT_THAT(camera.params, ElementsAre(1000, 320, -0.5, 0.1));
+  EXPECT_TRUE(camera.has_prior_focal_length);
+}
+
+TEST_F(DatabaseTest, CamerasThatCannotBeAreReadAsTheyAre) {
+  Write();
+  const auto read = [this](const std::string& values) {
+    Execute("UPDATE cameras SET " + values);
+    return Open().ReadCameras().begin()->second;
   };
-  identity.geometry[3] = blob({1, 0, 0, 0});
-  identity.geometry[4] = blob({0, -0.0, 0});
-  PairRows negative = MakeRows(ImagePair(1, 3), 20);
-  negative.geometry[3] = blob({0, -0.0, -0.0, -0.0});
-  negative.geometry[4] = blob({0, 0, 0});
-  PairRows moved = MakeRows(ImagePair(2, 3), 20);
-  moved.geometry[3] = blob({1, 0, 0, 0});
-  moved.geometry[4] = blob({0, 1, 0});
-  database.WritePairs({identity, negative, moved});
-  EXPECT_EQ(Query(GetParam() == Schema::kColmap38
-                      ? "SELECT count(*) FROM two_view_geometries WHERE qvec = zeroblob(32) AND "
-                        "tvec = zeroblob(24)"
-                      : "SELECT count(*) FROM two_view_geometries WHERE qvec IS NULL AND tvec IS "
-                        "NULL"),
-            2);
+  EXPECT_THAT(read("params = zeroblob(24)").params, SizeIs(3));
+  EXPECT_THAT(read("params = zeroblob(43)").params, SizeIs(5));
+  EXPECT_THAT(read("params = NULL").params, IsEmpty());
+  EXPECT_THAT(read("params = zeroblob(100000)").params, SizeIs(64));
+  EXPECT_EQ(read("width = -7").width, -1);
+  EXPECT_EQ(read("height = 4294967299").height, std::numeric_limits<int>::max());
+  EXPECT_EQ(read("model = 4294967299").model_id, std::numeric_limits<int>::max());
 }
 
 TEST_P(AnySchema, LeavesTheVersionAlone) {
@@ -733,8 +773,8 @@ INSTANTIATE_TEST_SUITE_P(Shards, ShardMatches,
 
 class ShardResults : public DatabaseTest {
  protected:
-  std::vector<PairRows> Read() const {
-    return ReadShard(Path(), {{ImagePair(1, 2), {}}}, {{1, 10}, {2, 10}});
+  std::vector<PairGeometry> Read() const {
+    return ReadShard(Path(), {ImagePair(1, 2)}, {{1, 10}, {2, 10}});
   }
   void Result(const std::string& match_values, const std::string& geometry_values) const {
     const std::string id = std::to_string(EncodePair(ImagePair(1, 2)));
@@ -747,14 +787,31 @@ class ShardResults : public DatabaseTest {
 TEST_F(ShardResults, AreReadWhole) {
   Result("2, 2, x'01000000020000000300000009000000'",
          "1, 2, x'0300000009000000', 3, zeroblob(72), NULL, zeroblob(72), NULL, NULL");
-  const std::vector<PairRows> results = Read();
+  const std::vector<PairGeometry> results = Read();
   ASSERT_THAT(results, SizeIs(1));
-  EXPECT_EQ(results[0].num_matches, 2U);
-  EXPECT_EQ(results[0].num_inliers, 1U);
-  EXPECT_THAT(results[0].inliers, ElementsAre(3, 0, 0, 0, 9, 0, 0, 0));
-  EXPECT_EQ(results[0].config, 3);
-  EXPECT_TRUE(results[0].geometry[0].has_value());
-  EXPECT_FALSE(results[0].geometry[1].has_value());
+  EXPECT_THAT(results[0].matches, ElementsAre(FeatureMatch{1, 2}, FeatureMatch{3, 9}));
+  EXPECT_THAT(results[0].geometry.inliers, ElementsAre(FeatureMatch{3, 9}));
+  EXPECT_EQ(results[0].geometry.configuration, TwoViewConfiguration::kUncalibrated);
+  EXPECT_FALSE(results[0].geometry.F.has_value());  // Zeros.
+  EXPECT_FALSE(results[0].geometry.E.has_value());
+}
+
+TEST_F(ShardResults, PosesThatAreNotSet) {
+  // COLMAP 3.9 to 3.13 write the identity where no relative pose was asked for; COLMAP 4 would take
+  // it for one. 3.8 writes zeros of either sign.
+  const std::string one = "000000000000F03F";
+  const std::string zero = "0000000000000000";
+  const std::string negative = "0000000000000080";
+  const auto pose = [&](const std::string& qvec, const std::string& tvec) {
+    std::filesystem::remove(Path());
+    Result("0, 2, NULL", "0, 2, NULL, 3, NULL, NULL, NULL, x'" + qvec + "', x'" + tvec + "'");
+    return Read()[0].geometry.pose;
+  };
+  EXPECT_FALSE(pose(one + zero + zero + zero, zero + negative + zero).has_value());
+  EXPECT_FALSE(pose(zero + negative + negative + negative, zero + zero + zero).has_value());
+  const std::optional<RelativePose> moved = pose(one + zero + zero + zero, zero + one + zero);
+  ASSERT_TRUE(moved.has_value());
+  EXPECT_THAT(moved->translation, ElementsAre(0, 1, 0));
 }
 
 TEST_F(ShardResults, MissingPair) {

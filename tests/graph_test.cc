@@ -4,13 +4,16 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/graph/components.h"
+#include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/listed_pairs.h"
 #include "colmap_graphmatch/graph/propagation.h"
@@ -28,6 +31,7 @@ using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::Pair;
 using ::testing::SizeIs;
 
 constexpr std::size_t kDim = 16;
@@ -1054,6 +1058,38 @@ TEST(ListedPairs, ThoseOfAList) {
   EXPECT_EQ(result.stages[LoopStage::kListed].num_tested, 2U);
   EXPECT_EQ(result.stages[LoopStage::kListed].num_edges, 1U);
   EXPECT_EQ(result.num_seed_pairs, 1U);
+}
+
+// Proposes one pair after the other, and keeps what it is told.
+class ListeningProposer : public PairProposer {
+ public:
+  explicit ListeningProposer(std::vector<VertexPair> pairs) : pairs_(std::move(pairs)) {}
+
+  std::optional<Proposal> Next(const MatchingGraph& /*graph*/) override {
+    if (next_ == pairs_.size()) return std::nullopt;
+    return Proposal{{pairs_[next_++]}, LoopStage::kListed, 0};
+  }
+  void OnVerified(const TestedVertexPair& pair, const InlierReader& inliers) override {
+    told[pair.pair] = inliers();
+  }
+
+  std::map<VertexPair, FeatureMatches> told;
+
+ private:
+  std::vector<VertexPair> pairs_;
+  std::size_t next_ = 0;
+};
+
+TEST(Explore, ProposersLearnTheInliersOfEveryPair) {
+  RecordingVerifier verifier({ImagePair(10, 20), ImagePair(20, 30), ImagePair(30, 40)});
+  verifier.known = {ImagePair(20, 30), ImagePair(10, 40), ImagePair(30, 40)};
+  ListeningProposer proposer({{0, 1}, {0, 2}, {2, 3}});
+  Explore(proposer, {10, 20, 30, 40}, verifier, {}, {{ImagePair(20, 30)}, true});
+  const auto one = [](ImageId a, ImageId b) { return FeatureMatches{{a, b}}; };
+  EXPECT_THAT(proposer.told,
+              ElementsAre(Pair(VertexPair(0, 1), one(10, 20)), Pair(VertexPair(0, 2), IsEmpty()),
+                          Pair(VertexPair(0, 3), IsEmpty()), Pair(VertexPair(1, 2), one(20, 30)),
+                          Pair(VertexPair(2, 3), one(30, 40))));
 }
 
 TEST(ReplayVerifier, AnswersFromTheGraph) {

@@ -107,16 +107,15 @@ TEST_F(FinishedGraphTest, ADatabaseWhoseImagesHaveOtherIds) {
       {{"c.jpg", descriptors, {}}, {"a.jpg", descriptors, {}}, {"b b.jpg", descriptors, {}}});
   {
     Database database(path, sqlite::Access::kReadWrite, 1);
-    PairRows edge;
+    PairGeometry edge;
     edge.pair = ImagePair(1, 2);
-    edge.num_matches = edge.num_inliers = 20;
-    edge.matches = edge.inliers = sqlite::Blob(20 * 8);
-    edge.config = 3;
-    PairRows none;
+    for (std::uint32_t i = 0; i < 20; ++i) edge.matches.push_back({i, i + 10});
+    edge.geometry.inliers = edge.matches;
+    edge.geometry.configuration = TwoViewConfiguration::kUncalibrated;
+    PairGeometry none;
     none.pair = ImagePair(2, 3);
-    none.num_matches = 17;
-    none.matches = sqlite::Blob(17 * 8);
-    none.config = 1;
+    none.matches = FeatureMatches(17);
+    none.geometry.configuration = TwoViewConfiguration::kDegenerate;
     database.WritePairs({edge, none});
   }
   const FinishedGraph graph = ReadFinishedGraph(path, images_, 15, 1);
@@ -124,6 +123,12 @@ TEST_F(FinishedGraphTest, ADatabaseWhoseImagesHaveOtherIds) {
   EXPECT_TRUE(graph.pairs.at(ImagePair(1, 4)).is_edge);
   EXPECT_FALSE(graph.pairs.at(ImagePair(1, 2)).is_edge);
   EXPECT_TRUE(graph.pairs.at(ImagePair(1, 2)).is_verified);
+  // The image of the greater id is the first one there.
+  const FeatureMatches inliers = graph.read_inliers(ImagePair(1, 4));
+  ASSERT_THAT(inliers, SizeIs(20));
+  EXPECT_EQ(inliers.front(), (FeatureMatch{10, 0}));
+  EXPECT_THAT(graph.read_inliers(ImagePair(1, 2)), IsEmpty());
+  EXPECT_THAT(graph.read_inliers(ImagePair(1, 99)), IsEmpty());
 }
 
 TEST_F(FinishedGraphTest, OfAPairThatIsThereTwiceTheLastLineCounts) {

@@ -14,10 +14,13 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/verification/batch_verifier.h"
+#include "colmap_graphmatch/verification/chosen_verifier.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 #include "colmap_graphmatch/verification/fault_isolation.h"
@@ -68,13 +71,14 @@ class VerifierTest : public ::testing::Test {
     const std::vector<ImageRecord> images = database.ReadImages();
     const auto warn = [this](const std::string& warning) { warnings_.push_back(warning); };
     const VerificationPlan plan = PlanVerification(options_, num_threads_, colmap);
-    ColmapVerifier geometry(options_, plan, colmap, database_path_, images, work.Path(), stop_,
-                            warn);
-    BatchVerifier verifier(options_, plan, geometry, database, images, stop_, warn);
-    const bool complete = verifier.Verify(pairs, [this](const VerifiedPair& pair) {
+    ChosenVerifier geometry(options_, plan, colmap, database, images, work.Path(), stop_, warn);
+    BatchVerifier verifier(options_, plan, geometry.Get(), database, images, stop_, warn);
+    const bool complete = verifier.Verify(pairs, [&](const VerifiedPair& pair) {
       EXPECT_TRUE(outcomes_.emplace(pair.pair, pair.outcome).second);
+      inliers_[pair.pair] = verifier.Inliers(pair.pair);
     });
     statistics_ = verifier.Statistics();
+    screening_ = geometry.Screening();
     matched_here_ = plan.matches_here;
     EXPECT_THAT(ShardDirectories(work.Path()), IsEmpty());
     return complete;
@@ -87,6 +91,8 @@ class VerifierTest : public ::testing::Test {
     }
     return names;
   }
+
+  std::map<ImagePair, FeatureMatches> inliers_;  // Of what was reported last.
 
   std::set<ImagePair> InDatabase() const {
     Database database(database_path_, sqlite::Access::kRead, 5);
@@ -115,6 +121,7 @@ class VerifierTest : public ::testing::Test {
   StopRequest stop_;
   std::map<ImagePair, PairOutcome> outcomes_;
   MatchingStatistics statistics_;
+  ScreenedVerifier::Statistics screening_;
   bool matched_here_ = false;
   std::vector<std::string> warnings_;
 };
@@ -140,6 +147,20 @@ TEST_F(VerifierTest, VerifiesEveryPairAndWritesItToTheDatabase) {
   EXPECT_EQ(InDatabase(), std::set<ImagePair>(pairs.begin(), pairs.end()));
   EXPECT_EQ(CountInLog("pair"), 300U);
   EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(VerifierTest, InliersAreReportedAndThoseOfKnownPairsRead) {
+  EXPECT_TRUE(Verify(AllPairs(12)));
+  for (const auto& [pair, inliers] : inliers_) {
+    EXPECT_THAT(inliers, SizeIs(IsFakeEdge(pair) ? 20 : 0));
+  }
+  EXPECT_EQ(inliers_.at(ImagePair(1, 2))[3], (FeatureMatch{3, 3}));
+  const std::map<ImagePair, FeatureMatches> before = std::exchange(inliers_, {});
+  const std::size_t runs = CountInLog("run");
+  outcomes_.clear();
+  EXPECT_TRUE(Verify(AllPairs(12)));
+  EXPECT_EQ(CountInLog("run"), runs);
+  EXPECT_EQ(inliers_, before);
 }
 
 TEST_F(VerifierTest, KnownPairsAreAnsweredWithoutColmap) {
@@ -265,15 +286,15 @@ TEST_F(VerifierTest, OptionsAreSpeltAsTheInstalledColmapSpellsThem) {
   Set("FAKE_COLMAP_SCHEMA", "42");
   Set("FAKE_COLMAP_GROUP", "FeatureMatching");
   options_.exact.matching.max_ratio = 0.7;
-  options_.colmap_options = {{"SiftMatching.max_error", "3"}};
-  options_.min_num_inliers = 18;
+  options_.geometry.max_error = 3;
+  options_.geometry.min_num_inliers = 18;
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("--FeatureMatching.max_ratio=0.7"),
                                     HasSubstr("--FeatureMatching.use_gpu=0"),
                                     HasSubstr("--FeatureMatching.num_threads=1"),
                                     HasSubstr("--FeatureMatching.min_num_inliers=18"))));
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("COLMAP 4.2.1 does not have these options, which "
-                                               "have no effect: SiftMatching.max_error.")));
+                                               "have no effect: TwoViewGeometry.max_error.")));
 }
 
 TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {
@@ -288,7 +309,7 @@ TEST_F(VerifierTest, GpuIsUsedWhereColmapHasOneAndTheUserWantsIt) {
 }
 
 TEST_F(VerifierTest, EdgesFollowMinNumInliers) {
-  options_.min_num_inliers = 21;  // The test double finds 20.
+  options_.geometry.min_num_inliers = 21;  // The test double finds 20.
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kNoEdge);
 }
@@ -342,6 +363,37 @@ TEST_F(ExactMatcherTest, ColmapOnlyGetsPairsWithEnoughMatches) {
   EXPECT_EQ(statistics_.num_matched, 300U);
   EXPECT_EQ(statistics_.num_unmatched, 250U);
   EXPECT_EQ(statistics_.num_image_reads, 25U);
+}
+
+TEST_F(ExactMatcherTest, SaysWhereMatchesAreIfItIsAsked) {
+  Database database(database_path_, sqlite::Access::kRead, 5);
+  const std::vector<ImageRecord> images = database.ReadImages();
+  const Keypoints keypoints1 = database.ReadKeypoints(images[0]);
+  const Keypoints keypoints2 = database.ReadKeypoints(images[1]);
+  const auto match = [&](ExactMatcher::Points points) {
+    ExactMatcher matcher(options_.exact, points, database_path_, images, 5, 1);
+    std::vector<MatchedPair> matched;
+    EXPECT_TRUE(matcher.Match(
+        {ImagePair(1, 2)}, [] { return false; }, &matched));
+    return matched.front();
+  };
+  const MatchedPair without = match(ExactMatcher::Points::kLeftOut);
+  EXPECT_THAT(without.points, IsEmpty());
+  EXPECT_THAT(without.distinctness, IsEmpty());
+  const MatchedPair with = match(ExactMatcher::Points::kGiven);
+  EXPECT_EQ(with.matches, without.matches);
+  ASSERT_THAT(with.points, SizeIs(with.matches.size()));
+  ASSERT_THAT(with.distinctness, SizeIs(with.matches.size()));
+  for (std::size_t i = 0; i < with.matches.size(); ++i) {
+    const float* first = &keypoints1.data[with.matches[i].feature1 * keypoints1.num_cols];
+    const float* second = &keypoints2.data[with.matches[i].feature2 * keypoints2.num_cols];
+    EXPECT_EQ(with.points[i].x1, first[0]);
+    EXPECT_EQ(with.points[i].y1, first[1]);
+    EXPECT_EQ(with.points[i].x2, second[0]);
+    EXPECT_EQ(with.points[i].y2, second[1]);
+    EXPECT_GT(with.distinctness[i], 1 - options_.exact.matching.max_ratio);
+    EXPECT_LE(with.distinctness[i], 1);
+  }
 }
 
 TEST_F(ExactMatcherTest, UnmatchedPairsGetTheRowsOfColmap) {
@@ -437,7 +489,7 @@ TEST_F(ExactMatcherTest, ColmapGetsManyPairsAtATimeThoughFewHaveMatches) {
 }
 
 TEST_F(ExactMatcherTest, GuidedMatchingNeedsDescriptors) {
-  options_.colmap_options = {{"guided_matching", "1"}};
+  options_.geometry.guided_matching = true;
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_THAT(Log(), Contains("descriptors of 2 images"));
 }
@@ -587,26 +639,172 @@ TEST(Subprocess, ThatCannotStart) {
                ColmapError);
 }
 
+// The same, with a fit in this process. The features of a place are at the same spots in every
+// image, but for those that a test moves.
+class InProcessTest : public ExactMatcherTest {
+ protected:
+  // Moves the features of an image from the given row on to random spots.
+  void Scatter(ImageId image, std::size_t first) {
+    Keypoints keypoints = Database(database_path_, sqlite::Access::kRead, 5).ReadKeypoints(image);
+    Random random({image});
+    for (std::size_t row = first; row < keypoints.num_rows; ++row) {
+      float* keypoint = keypoints.data.data() + row * keypoints.num_cols;
+      keypoint[0] = static_cast<float>(800 * random.Uniform());
+      keypoint[1] = static_cast<float>(600 * random.Uniform());
+    }
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(keypoints.data.data());
+    const sqlite::Blob data(bytes, bytes + keypoints.data.size() * sizeof(float));
+    sqlite::Connection connection(database_path_, sqlite::Access::kReadWrite, 5);
+    sqlite::Statement update(connection, "UPDATE keypoints SET data = ?1 WHERE image_id = ?2");
+    update.Bind(1, data).Bind(2, std::int64_t{image}).Run();
+  }
+
+  std::size_t NumMatches(const ImagePair& pair) const {
+    return Database(database_path_, sqlite::Access::kRead, 5).ReadMatches(pair).size();
+  }
+};
+
+TEST_F(InProcessTest, ColmapIsTheJudgeOfWhatIsLikely) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  EXPECT_TRUE(Verify(AllPairs(25)));
+  for (const auto& [pair, outcome] : outcomes_) {
+    EXPECT_EQ(outcome,
+              SamePlace(pair) && IsFakeEdge(pair) ? PairOutcome::kEdge : PairOutcome::kNoEdge);
+  }
+  EXPECT_EQ(CountInLog("pair"), 50U);
+  EXPECT_EQ(screening_.num_screened, 50U);
+  EXPECT_EQ(screening_.num_settled, 0U);
+  EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("--SiftMatching.max_num_trials=100"),
+                                    HasSubstr("--SiftMatching.min_inlier_ratio=0.8"))));
+  EXPECT_EQ(NumMatches(ImagePair(1, 2)), 30U);
+}
+
+TEST_F(InProcessTest, HopelessPairsAreSettledAndKeepTheirMatches) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  Scatter(2, 0);
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kNoEdge);
+  EXPECT_EQ(screening_.num_settled, 1U);
+  EXPECT_EQ(CountInLog("pair"), 0U);
+  EXPECT_EQ(NumMatches(ImagePair(1, 2)), 30U);
+  sqlite::Connection connection(database_path_, sqlite::Access::kRead, 5);
+  sqlite::Statement select(connection, "SELECT rows, config, data, F FROM two_view_geometries");
+  ASSERT_TRUE(select.Step());
+  EXPECT_EQ(select.Int(0), 0);
+  EXPECT_EQ(select.Int(1), 0);
+  EXPECT_TRUE(select.IsNull(2));
+  EXPECT_TRUE(select.IsNull(3));
+}
+
+TEST_F(InProcessTest, ColmapGetsTheMatchesNearAModelAndAllOfAClosePair) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  Scatter(2, 24);
+  Scatter(3, 14);
+  EXPECT_TRUE(Verify({ImagePair(1, 2), ImagePair(1, 3)}));
+  const auto given = [this](const std::string& pair) {
+    for (const std::string& line : Log()) {
+      const std::string beginning = "given " + pair + ": ";
+      if (line.rfind(beginning, 0) == 0) return std::stoi(line.substr(beginning.size()));
+    }
+    return 0;
+  };
+  EXPECT_GE(given("1 2"), 24);
+  EXPECT_LT(given("1 2"), 30);
+  EXPECT_EQ(given("1 3"), 30);
+  EXPECT_EQ(NumMatches(ImagePair(1, 2)), 30U);
+  EXPECT_EQ(NumMatches(ImagePair(1, 3)), 30U);
+}
+
+TEST_F(InProcessTest, WhatTheFitCannotJudgeGoesToColmapWhole) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
+      .Execute("UPDATE cameras SET params = zeroblob(8)");
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_EQ(screening_.num_screened, 0U);
+  EXPECT_THAT(Log(), Contains("given 1 2: 30"));
+  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("25 images have cameras")));
+}
+
+TEST_F(InProcessTest, WhatOnlyColmapHasGoesToColmap) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  options_.geometry.multiple_models = true;
+  EXPECT_EQ(PlanVerification(options_, num_threads_, {}).verifier,
+            VerificationOptions::Verifier::kColmap);
+  options_.verifier = VerificationOptions::Verifier::kNative;
+  EXPECT_THROW(options_.Check(), OptionsError);
+  options_.geometry.multiple_models = false;
+  EXPECT_EQ(PlanVerification(options_, num_threads_, {}).verifier,
+            VerificationOptions::Verifier::kNative);
+  options_.matcher = VerificationOptions::Matcher::kColmap;
+  EXPECT_THROW(options_.Check(), OptionsError);
+}
+
+TEST_F(InProcessTest, NativelyWithoutColmapOnAnyNumberOfThreads) {
+  options_.verifier = VerificationOptions::Verifier::kNative;
+  Scatter(2, 0);
+  std::string dump;
+  for (const int num_threads : {1, 3}) {
+    Clear();
+    num_threads_ = num_threads;
+    EXPECT_TRUE(Verify(AllPairs(25)));
+    for (const auto& [pair, outcome] : outcomes_) {
+      const bool is_edge = SamePlace(pair) && pair.id1 != 2 && pair.id2 != 2;
+      EXPECT_EQ(outcome, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge);
+    }
+    EXPECT_EQ(CountInLog("run"), 0U);
+    if (num_threads > 1) {
+      EXPECT_EQ(Dump(), dump);
+    }
+    dump = Dump();
+  }
+  // One homography fits all.
+  sqlite::Connection connection(database_path_, sqlite::Access::kRead, 5);
+  sqlite::Statement select(connection,
+                           "SELECT count(*) FROM two_view_geometries WHERE rows = 30 AND config = "
+                           "6 AND length(H) = 72");
+  select.Step();
+  EXPECT_EQ(select.Int(0), 46);
+}
+
+TEST_F(InProcessTest, MatchesThatAwaitVerificationAreVerifiedNativelyToo) {
+  options_.verifier = VerificationOptions::Verifier::kNative;
+  {
+    // Two images of different places: what is imported counts, not what descriptors say.
+    FeatureMatches matches;
+    for (std::uint32_t i = 0; i < 25; ++i) matches.push_back({i, i});
+    sqlite::Connection connection(database_path_, sqlite::Access::kReadWrite, 5);
+    sqlite::Statement insert(connection, "INSERT INTO matches VALUES(?1, ?2, ?3, ?4)");
+    insert.Bind(1, static_cast<std::int64_t>(EncodePair(ImagePair(1, 9))));
+    BindMatches(matches, 2, &insert);
+    insert.Run();
+  }
+  EXPECT_TRUE(Verify({ImagePair(1, 9)}));
+  EXPECT_EQ(outcomes_.at(ImagePair(1, 9)), PairOutcome::kEdge);
+  EXPECT_THAT(inliers_.at(ImagePair(1, 9)), SizeIs(25));
+}
+
 // Fails on shards with one of these pairs, and notes the sizes of all.
 class FailingOn : public GeometryVerifier {
  public:
   explicit FailingOn(std::set<ImagePair> pairs, int times = 1000000)
       : guilty_(std::move(pairs)), times_(times) {}
 
-  ShardOutcome Verify(const std::vector<ShardPair>& pairs,
+  ShardOutcome Verify(const std::vector<PairToVerify>& pairs,
                       const std::function<bool()>& /*should_stop*/) override {
     sizes.push_back(pairs.size());
     ShardOutcome outcome;
-    for (const ShardPair& pair : pairs) {
+    for (const PairToVerify& pair : pairs) {
       if (guilty_.count(pair.pair) > 0 && times_ > 0) outcome.problem = "failed";
-      PairRows rows;
-      rows.pair = pair.pair;
-      outcome.results.push_back(rows);
+      PairGeometry result;
+      result.pair = pair.pair;
+      outcome.results.push_back(result);
     }
     if (!outcome.problem.empty()) --times_;
     return outcome;
   }
-  int ConfigOfUnmatched() const override { return 0; }
+  TwoViewConfiguration ConfigurationOfUnmatched() const override {
+    return TwoViewConfiguration::kUndefined;
+  }
 
   std::vector<std::size_t> sizes;
 
@@ -618,7 +816,7 @@ class FailingOn : public GeometryVerifier {
 class KeepingProgress : public ShardRunner::Progress {
  public:
   void Finish(ShardPart part) override {
-    for (const PairRows& rows : part.results) verified.insert(rows.pair);
+    for (const PairGeometry& result : part.results) verified.insert(result.pair);
     for (const ShardPart::Failure& failure : part.failures) failed.insert(failure.first);
   }
   bool GivesUp() const override { return gives_up; }
@@ -628,8 +826,8 @@ class KeepingProgress : public ShardRunner::Progress {
   bool gives_up = false;
 };
 
-std::vector<ShardPair> ShardOf(const std::vector<ImagePair>& pairs) {
-  std::vector<ShardPair> shard;
+std::vector<PairToVerify> ShardOf(const std::vector<ImagePair>& pairs) {
+  std::vector<PairToVerify> shard;
   for (const ImagePair& pair : pairs) shard.push_back({pair, std::nullopt});
   return shard;
 }

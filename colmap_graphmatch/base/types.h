@@ -12,6 +12,9 @@ namespace colmap_graphmatch {
 // COLMAP's image_t. Valid ids are 1 .. kMaxNumImages - 1.
 using ImageId = std::uint32_t;
 
+// COLMAP's camera_t.
+using CameraId = std::uint32_t;
+
 // COLMAP's image_pair_t: the key of the tables `matches` and `two_view_geometries`.
 using PairId = std::uint64_t;
 
@@ -30,6 +33,7 @@ struct ImageRecord {
   ImageId id = 0;
   std::string name;
   std::size_t num_features = 0;  // 0 also for an image whose features were never extracted.
+  CameraId camera_id = 0;
 };
 
 // An unordered pair of two different images, kept with the smaller id first, as COLMAP stores it.

@@ -225,8 +225,8 @@ int Main(int argc, const char* const* argv) {
   };
   try {
     const CommandLine line = ParseCommandLine(argc, argv, &stop_request);
-    if (line.help) {
-      PrintHelp(std::cout);
+    if (line.help || line.help_all) {
+      (line.help_all ? PrintFullHelp : PrintHelp)(std::cout);
       WarnIfNotWritten(std::cout.flush(), *console);
       return kExitSuccess;
     }

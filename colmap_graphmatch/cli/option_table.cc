@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "colmap_graphmatch/cli/option_values.h"
@@ -86,36 +88,32 @@ class Table {
   OptionRow& PassOn(std::vector<ColmapSpelling> colmap, CheckedText text, const std::string& help) {
     const std::string& name = colmap.back().name.empty() ? colmap.front().name : colmap.back().name;
     std::map<std::string, std::string>* options = &line_->pipeline.verification.colmap_options;
+    return PassOn(
+        std::move(colmap), std::move(text),
+        [options, key = name](const std::string& checked) { (*options)[key] = checked; }, help);
+  }
+
+  // It is stored in a field, from which COLMAP gets it if it is set.
+  template <typename T>
+  OptionRow& PassOn(std::vector<ColmapSpelling> colmap, CheckedText text, std::optional<T>* field,
+                    const std::string& help) {
+    return PassOn(
+        std::move(colmap), std::move(text),
+        [field](const std::string& checked) { Store(checked, field); }, help);
+  }
+
+  OptionRow& PassOn(std::vector<ColmapSpelling> colmap, CheckedText text,
+                    const std::function<void(const std::string&)>& store, const std::string& help) {
     Value value;
     value.values = std::move(text.values);
     value.choices = std::move(text.choices);
-    value.read = [options, key = name, check = std::move(text.check)](const std::string& given) {
+    value.read = [store, check = std::move(text.check)](const std::string& given) {
       std::string checked = given;
       if (!check(&checked)) return false;
-      (*options)[key] = checked;
+      store(checked);
       return true;
     };
     return AddGrouped(Use::kPassedOn, std::move(colmap), std::move(value), help);
-  }
-
-  OptionRow& PassBool(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), BoolText(), help);
-  }
-
-  OptionRow& PassInt(std::vector<ColmapSpelling> colmap, int minimum, const std::string& help) {
-    return PassOn(std::move(colmap), IntText(minimum), help);
-  }
-
-  OptionRow& PassShare(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), ShareText(), help);
-  }
-
-  OptionRow& PassPixels(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), PositiveText(), help);
-  }
-
-  OptionRow& PassText(std::vector<ColmapSpelling> colmap, const std::string& help) {
-    return PassOn(std::move(colmap), AnyText(), help);
   }
 
   void AddUnused(std::vector<ColmapSpelling> colmap, const std::string& why) {
@@ -141,16 +139,20 @@ class Table {
 void Table::AddGeneral() {
   PipelineOptions& p = line_->pipeline;
   Section("General");
-  Add("help", Flag(&line_->help), "print this help").names.emplace_back("h");
+  Add("help", Flag(&line_->help), "print an example and the options that are used most")
+      .names.emplace_back("h");
+  Add("help-all", Flag(&line_->help_all), "print all options");
   Add("version", Flag(&line_->version), "print the version");
   AddColmap(Use::kHere, {{{3, 8}, "database_path", ""}},
             TextOf(&p.database_path, "the path of a COLMAP database"),
-            "the COLMAP database with the features; the matches are written to it");
+            "the COLMAP database with the features; the matches are written to it")
+      .is_common = true;
   AddColmap(Use::kHere, {{{3, 8}, "project_path", ""}},
             TextOf(&line_->project_path, "the path of a file"),
             "an ini file with options, as COLMAP writes it; the command line goes before");
   Add("colmap_path", TextOf(&p.colmap_path, "a path, or a name on PATH", OptionRow::Path::kProgram),
-      "the COLMAP program: a path, or a name on PATH");
+      "the COLMAP program: a path, or a name on PATH")
+      .is_common = true;
   AddColmap(
       Use::kHere, {{{3, 8}, "random_seed", "0"}, {{3, 13}, "default_random_seed", "0"}},
       SeedOf(&p.seed, &line_->seed_from_clock),
@@ -164,10 +166,11 @@ void Table::AddGraph() {
   Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategyWords),
       "which pairs are tested: those that graphmatch finds; for comparison sampling or propagation "
       "(after one sampling) alone, retrieval: the nearest images of each, briad: retrieval and "
-      "query "
-      "expansion; exhaustive: all");
+      "query expansion; exhaustive: all")
+      .is_common = true;
   Add("GraphMatching.match_list_path", TextOf(&p.match_list_path, "the path of a list of pairs"),
-      "a file of image pairs to be tested instead, two names a line");
+      "a file of image pairs to be tested instead, two names a line")
+      .is_common = true;
   AddColmap(Use::kHere, {{{3, 8}, "VocabTreeMatching.match_list_path", ""}},
             // COLMAP's default is an empty one.
             TextOrNothingOf(&p.image_list_path, "the path of a list of images"),
@@ -176,8 +179,8 @@ void Table::AddGraph() {
       "iterations (>= 0) that sample before propagating; later ones only propagate");
   Add("GraphMatching.max_tests_for_sampling", IntOf(&p.graph.max_tests_for_sampling, 0),
       "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N "
-      "images. "
-      "More finds weaker links and costs up to N tests for each");
+      "images. More finds weaker links and costs up to N tests for each")
+      .is_common = true;
   OptionRow& neighbors =
       Add("GraphMatching.max_num_neighbors", IntOf(&p.graph.max_num_neighbors, 1),
           "neighbours (>= 1) after which an image looks for no more itself. Fewer thins dense "
@@ -193,7 +196,8 @@ void Table::AddGraph() {
       "goes on; 0: no limit");
   Add("GraphMatching.max_minutes", DoubleOf(&p.budget.max_minutes, Zero::kAllowed),
       "minutes (>= 0) after which no pair is tested any more, counted from the start; ranking the "
-      "images is not cut short; 0: no limit");
+      "images is not cut short; 0: no limit")
+      .is_common = true;
   Add("GraphMatching.dry_run", BoolOf(&line_->dry_run),
       "only rank the images: the first candidates are counted, and written by export_pairs; "
       "nothing "
@@ -216,7 +220,8 @@ void Table::AddVectors() {
       "of the photo, or vectors of another program from a file");
   Add("image_path",
       TextOf(&vectors.image_path, "the path of a directory", OptionRow::Path::kDirectory),
-      "the directory of the photos: for the descriptor gist, and to show photos in the report");
+      "the directory of the photos: to show them in the report, and for the descriptor gist")
+      .is_common = true;
   Add("GraphMatching.vectors_path", TextOf(&vectors.vectors_path, "the path of a .npy file"),
       "for the descriptor file: a NumPy array, a row of float32 or float64 for each image; the "
       "images' names are in the file of the same name with .txt instead of .npy, one a line");
@@ -242,6 +247,10 @@ void Table::AddMatching() {
   Add("GraphMatching.matcher", OneOf(&p.verification.matcher, kMatcherWords),
       "exact: by this program; colmap: by COLMAP; auto: by COLMAP if it has a GPU and use_gpu is "
       "on, else exact");
+  Add("GraphMatching.verifier", OneOf(&p.verification.verifier, kVerifierWords),
+      "colmap: COLMAP's geometric verification; screened: the same, after a fast fit that settles "
+      "hopeless pairs and leaves COLMAP the likely matches; native: by this program, without "
+      "COLMAP");
   Add("GraphMatching.cache_gb", DoubleOf(&exact.cache_gb, Zero::kAllowed),
       "GB (>= 0) of descriptors kept in memory; 0: a quarter of the memory. Less reads images more "
       "often");
@@ -270,9 +279,9 @@ void Table::AddEvaluation() {
   Section("GraphMatch: what a run tells, and how it is compared with others");
   Add("GraphMatching.report", TextOf(&line_->report_path, "the path of a file"),
       "a page (.html, and the same as .json beside it) or a JSON file to write with what was "
-      "found, "
-      "what it cost, and what is wrong with images that match nothing. With --image_path the page "
-      "shows the photos");
+      "found, what it cost, and what is wrong with images that match nothing. With --image_path "
+      "the page shows the photos")
+      .is_common = true;
   Add("GraphMatching.export_pairs", TextOf(&line_->pair_list_path, "the path of a file"),
       "write the edges, those with the most inliers first, as a list of pairs as COLMAP and hloc "
       "read it; in a dry run the candidates, nearest first");
@@ -316,18 +325,21 @@ void Table::AddLog() {
 void Table::AddColmapMatching() {
   PipelineOptions& p = line_->pipeline;
   DescriptorMatchingOptions& matching = p.verification.exact.matching;
+  GeometryOptions& geometry = p.verification.geometry;
   Section(
       "COLMAP's options of matching and verification, accepted in each of the groups "
       "SiftMatching, TwoViewGeometry and FeatureMatching");
   AddGrouped(Use::kHere,
              {{{3, 8}, "SiftMatching.use_gpu", "1"}, {{3, 13}, "FeatureMatching.use_gpu", "1"}},
-             BoolOf(&p.verification.use_gpu), "match on the GPU if the installed COLMAP can");
-  PassText({{{3, 8}, "SiftMatching.gpu_index", "-1"}, {{3, 13}, "FeatureMatching.gpu_index", "-1"}},
-           "which GPUs, e.g. 0,1; -1: all");
+             BoolOf(&p.verification.use_gpu), "match on the GPU if the installed COLMAP can")
+      .is_common = true;
+  PassOn({{{3, 8}, "SiftMatching.gpu_index", "-1"}, {{3, 13}, "FeatureMatching.gpu_index", "-1"}},
+         AnyText(), "which GPUs, e.g. 0,1; -1: all");
   AddGrouped(
       Use::kHere,
       {{{3, 8}, "SiftMatching.num_threads", "-1"}, {{3, 13}, "FeatureMatching.num_threads", "-1"}},
-      NumThreadsOf(&p.num_threads), "cores to use at a time, COLMAP's included; below 1: all");
+      NumThreadsOf(&p.num_threads), "cores to use at a time, COLMAP's included; below 1: all")
+      .is_common = true;
   AddGrouped(Use::kHere,
              {{{3, 13}, "FeatureMatching.type", "SIFT"},
               {{4, 0}, "FeatureMatching.type", "SIFT_BRUTEFORCE"}},
@@ -345,54 +357,61 @@ void Table::AddColmapMatching() {
              {{{3, 8}, "SiftMatching.max_num_matches", "32768"},
               {{3, 13}, "FeatureMatching.max_num_matches", "32768"}},
              IntOf(&matching.max_num_matches, 1), "features of an image that are matched at most");
-  PassBool({{{3, 8}, "SiftMatching.guided_matching", "0"},
-            {{3, 13}, "FeatureMatching.guided_matching", "0"}},
-           "match again along the epipolar geometry that was found");
+  PassOn({{{3, 8}, "SiftMatching.guided_matching", "0"},
+          {{3, 13}, "FeatureMatching.guided_matching", "0"}},
+         BoolText(), &geometry.guided_matching,
+         "match again along the epipolar geometry that was found");
   AddGrouped(Use::kHere,
              {{{3, 8}, "SiftMatching.min_num_inliers", "15"},
               {{3, 9}, "TwoViewGeometry.min_num_inliers", "15"}},
-             IntOf(&p.verification.min_num_inliers, 0), "inliers that make a pair an edge");
-  PassPixels({{{3, 8}, "SiftMatching.max_error", "4"}, {{3, 9}, "TwoViewGeometry.max_error", "4"}},
-             "greatest epipolar error of an inlier, in pixels");
-  PassShare({{{3, 8}, "SiftMatching.confidence", "0.999"},
-             {{3, 9}, "TwoViewGeometry.confidence", "0.999"}},
-            "confidence of RANSAC");
-  PassInt({{{3, 8}, "SiftMatching.max_num_trials", "10000"},
-           {{3, 9}, "TwoViewGeometry.max_num_trials", "10000"}},
-          30, "trials of RANSAC at most");
-  PassShare({{{3, 8}, "SiftMatching.min_inlier_ratio", "0.25"},
-             {{3, 9}, "TwoViewGeometry.min_inlier_ratio", "0.25"},
-             {{4, 2}, "TwoViewGeometry.min_inlier_ratio", "0"}},
-            "inlier ratio that RANSAC counts on");
-  PassBool({{{3, 8}, "SiftMatching.multiple_models", "0"},
-            {{3, 9}, "TwoViewGeometry.multiple_models", "0"}},
-           "look for several motions in a pair");
-  PassBool({{{3, 8}, "SiftMatching.compute_relative_pose", "0"},
-            {{3, 9}, "TwoViewGeometry.compute_relative_pose", "0"}},
-           "store the relative pose as well");
-  PassBool({{{3, 8}, "SiftMatching.planar_scene", "0"}, {{3, 9}, "", ""}}, "the scene is planar");
-  PassBool({{{3, 12}, "SiftMatching.cpu_brute_force_matcher", "0"}},
-           "match exactly where COLMAP matches without a GPU; much slower");
-  PassBool({{{3, 13}, "TwoViewGeometry.detect_watermark", "1"}},
-           "mark pairs that only a watermark links");
-  PassBool({{{3, 13}, "TwoViewGeometry.multiple_ignore_watermark", "1"}},
-           "leave watermarks out of several motions");
-  PassPixels({{{3, 13}, "TwoViewGeometry.watermark_detection_max_error", "4"}},
-             "greatest error of a watermark's inlier, in pixels");
-  PassBool({{{3, 13}, "TwoViewGeometry.filter_stationary_matches", "0"}},
-           "drop matches at the same place in both images");
-  PassPixels({{{3, 13}, "TwoViewGeometry.stationary_matches_max_error", "4"}},
-             "what the same place means, in pixels");
-  PassInt({{{3, 13}, "TwoViewGeometry.random_seed", "-1"}}, -1,
-          "seed of RANSAC, the same for every pair; -1: of the thread");
-  PassBool({{{4, 2}, "TwoViewGeometry.use_degensac", "0"}}, "use DEGENSAC");
-  PassBool({{{4, 2}, "TwoViewGeometry.use_sampson_refinement", "1"}}, "refine by Sampson errors");
+             IntOf(&p.verification.geometry.min_num_inliers, 0),
+             "inliers that make a pair an edge");
+  PassOn({{{3, 8}, "SiftMatching.max_error", "4"}, {{3, 9}, "TwoViewGeometry.max_error", "4"}},
+         PositiveText(), &geometry.max_error, "greatest epipolar error of an inlier, in pixels");
+  PassOn({{{3, 8}, "SiftMatching.confidence", "0.999"},
+          {{3, 9}, "TwoViewGeometry.confidence", "0.999"}},
+         ShareText(), &geometry.confidence, "confidence of RANSAC");
+  PassOn({{{3, 8}, "SiftMatching.max_num_trials", "10000"},
+          {{3, 9}, "TwoViewGeometry.max_num_trials", "10000"}},
+         IntText(30), &geometry.max_num_trials, "trials of RANSAC at most");
+  PassOn({{{3, 8}, "SiftMatching.min_inlier_ratio", "0.25"},
+          {{3, 9}, "TwoViewGeometry.min_inlier_ratio", "0.25"},
+          {{4, 2}, "TwoViewGeometry.min_inlier_ratio", "0"}},
+         ShareText(), &geometry.min_inlier_ratio, "inlier ratio that RANSAC counts on");
+  PassOn({{{3, 8}, "SiftMatching.multiple_models", "0"},
+          {{3, 9}, "TwoViewGeometry.multiple_models", "0"}},
+         BoolText(), &geometry.multiple_models, "look for several motions in a pair");
+  PassOn({{{3, 8}, "SiftMatching.compute_relative_pose", "0"},
+          {{3, 9}, "TwoViewGeometry.compute_relative_pose", "0"}},
+         BoolText(), &geometry.compute_relative_pose, "store the relative pose as well");
+  PassOn({{{3, 8}, "SiftMatching.planar_scene", "0"}, {{3, 9}, "", ""}}, BoolText(),
+         &geometry.planar_scene, "the scene is planar");
+  PassOn({{{3, 12}, "SiftMatching.cpu_brute_force_matcher", "0"}}, BoolText(),
+         "match exactly where COLMAP matches without a GPU; much slower");
+  PassOn({{{3, 13}, "TwoViewGeometry.detect_watermark", "1"}}, BoolText(),
+         &geometry.detect_watermark, "mark pairs that only a watermark links");
+  PassOn({{{3, 13}, "TwoViewGeometry.multiple_ignore_watermark", "1"}}, BoolText(),
+         &geometry.multiple_ignore_watermark, "leave watermarks out of several motions");
+  PassOn({{{3, 13}, "TwoViewGeometry.watermark_detection_max_error", "4"}}, PositiveText(),
+         &geometry.watermark_detection_max_error,
+         "greatest error of a watermark's inlier, in pixels");
+  PassOn({{{3, 13}, "TwoViewGeometry.filter_stationary_matches", "0"}}, BoolText(),
+         &geometry.filter_stationary_matches, "drop matches at the same place in both images");
+  PassOn({{{3, 13}, "TwoViewGeometry.stationary_matches_max_error", "4"}}, PositiveText(),
+         &geometry.stationary_matches_max_error, "what the same place means, in pixels");
+  PassOn({{{3, 13}, "TwoViewGeometry.random_seed", "-1"}}, IntText(-1), &geometry.random_seed,
+         "seed of RANSAC, the same for every pair; -1: of the thread");
+  PassOn({{{4, 2}, "TwoViewGeometry.use_degensac", "0"}}, BoolText(), &geometry.use_degensac,
+         "use DEGENSAC");
+  PassOn({{{4, 2}, "TwoViewGeometry.use_sampson_refinement", "1"}}, BoolText(),
+         &geometry.use_sampson_refinement, "refine by Sampson errors");
   AddGrouped(Use::kHere, {{{4, 0}, "FeatureMatching.skip_image_pairs_in_same_frame", "0"}},
              BoolOf(&p.skip_image_pairs_in_same_frame),
              "do not test pairs of images that a rig took at the same time");
-  PassShare({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, "score of a match by LightGlue");
-  PassText({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, "the model of LightGlue").path =
-      OptionRow::Path::kFile;
+  PassOn({{{4, 0}, "SiftMatching.lightglue_min_score", "0.1"}}, ShareText(),
+         "score of a match by LightGlue");
+  PassOn({{{4, 0}, "SiftMatching.lightglue_model_path", ""}}, AnyText(), "the model of LightGlue")
+      .path = OptionRow::Path::kFile;
 }
 
 void Table::AddUnusedOptions() {

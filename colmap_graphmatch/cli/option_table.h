@@ -47,6 +47,7 @@ struct OptionRow {
   std::vector<std::string> choices;  // All that the value may be, if they can be listed.
   Path path = Path::kNone;           // What the value is the path of.
   std::string help;
+  bool is_common = false;              // One of the few that the short help shows.
   std::vector<ColmapSpelling> colmap;  // Ascending; empty for options of this program.
 
   // All names under which it is accepted, `name` first: those that any version of COLMAP has, and

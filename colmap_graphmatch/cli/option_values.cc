@@ -144,6 +144,14 @@ CheckedText AnyText() {
   return {"a text", [](const std::string*) { return true; }};
 }
 
+void Store(const std::string& checked, std::optional<bool>* field) { *field = checked == "1"; }
+
+void Store(const std::string& checked, std::optional<int>* field) { *field = Number<int>(checked); }
+
+void Store(const std::string& checked, std::optional<double>* field) {
+  *field = Number<double>(checked);
+}
+
 std::optional<bool> ParseBool(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

@@ -104,6 +104,11 @@ CheckedText ShareText();  // From 0 to 1.
 CheckedText PositiveText();
 CheckedText AnyText();
 
+// The number or truth that a checked text stands for.
+void Store(const std::string& checked, std::optional<bool>* field);
+void Store(const std::string& checked, std::optional<int>* field);
+void Store(const std::string& checked, std::optional<double>* field);
+
 // The words for truth that COLMAP understands, in any case (Boost.Program_options' own): true, yes,
 // on, 1 and their opposites.
 std::optional<bool> ParseBool(std::string text);

@@ -26,7 +26,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-constexpr char kSeeHelp[] = "`graphmatch_matcher -h` lists the options.";
+constexpr char kSeeHelp[] = "`graphmatch_matcher --help-all` lists the options.";
 
 std::string WithoutGroup(const std::string& name) { return name.substr(name.find('.') + 1); }
 
@@ -103,11 +103,12 @@ class Parser {
 
   void Parse(int argc, const char* const* argv) {
     ReadArguments(argc, argv);
-    if (line_->help || line_->version) return;
+    if (line_->help || line_->help_all || line_->version) return;
     if (!line_->project_path.empty()) ReadProject();
     if (line_->pipeline.database_path.empty()) {
-      throw OptionsError("--database_path is missing: the COLMAP database with the features. " +
-                         std::string(kSeeHelp));
+      throw OptionsError(
+          "--database_path is missing: the COLMAP database with the features. `graphmatch_matcher "
+          "-h` has an example.");
     }
     PipelineOptions& p = line_->pipeline;
     if (line_->lightglue) {
@@ -228,9 +229,9 @@ class Parser {
                                     option.string_key + ". " + Suggest(option.string_key);
         if (group == "GraphMatching") throw OptionsError(problem);
         // It may be one of a newer COLMAP.
-        static const std::set<std::string> kMatchingGroups = {
+        static const std::set<std::string> kColmapsGroups = {
             "SiftMatching", "TwoViewGeometry", "FeatureMatching", "VocabTreeMatching"};
-        if (kMatchingGroups.count(group) > 0) line_->warnings.push_back(problem);
+        if (kColmapsGroups.count(group) > 0) line_->warnings.push_back(problem);
         continue;
       }
       const std::string value = option.value.empty() ? "" : option.value.front();

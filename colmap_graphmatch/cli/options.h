@@ -15,6 +15,7 @@ struct CommandLine {
   PipelineOptions pipeline;
   bool dry_run = false;  // Only the candidates are wanted.
   bool help = false;
+  bool help_all = false;
   bool version = false;
   std::filesystem::path project_path;
   std::filesystem::path report_path;
@@ -34,6 +35,10 @@ struct CommandLine {
 // OptionsError and StoppedError.
 CommandLine ParseCommandLine(int argc, const char* const* argv, const StopRequest* stop = nullptr);
 
+// For -h and --help: one screen with an example and the options that are used most.
 void PrintHelp(std::ostream& stream);
+
+// For --help-all: every option that has an effect.
+void PrintFullHelp(std::ostream& stream);
 
 }  // namespace colmap_graphmatch

@@ -13,9 +13,7 @@
 namespace colmap_graphmatch {
 namespace {
 
-using Use = RunFile::Use;
-
-void AddDatabase(const std::string& option, const std::filesystem::path& path, Use use,
+void AddDatabase(const std::string& option, const std::filesystem::path& path, RunFile::Use use,
                  std::vector<RunFile>* files) {
   files->push_back({option, path, use});
   for (const std::filesystem::path& beside : sqlite::FilesBeside(path)) {
@@ -46,44 +44,44 @@ std::vector<RunFile> FilesOfRun(const CommandLine& line) {
   const PipelineOptions& p = line.pipeline;
   const ImageRankingOptions& ranking = p.ranking;
   std::vector<RunFile> files;
-  AddDatabase("--database_path", p.database_path, Use::kKept, &files);
-  AddDatabase("--database_path with .graphmatch", StateFile::PathFor(p.database_path), Use::kKept,
-              &files);
+  AddDatabase("--database_path", p.database_path, RunFile::Use::kKept, &files);
+  AddDatabase("--database_path with .graphmatch", StateFile::PathFor(p.database_path),
+              RunFile::Use::kKept, &files);
   const auto read = [&files](const char* option, const std::filesystem::path& path) {
-    if (!path.empty()) files.push_back({option, path, Use::kRead});
+    if (!path.empty()) files.push_back({option, path, RunFile::Use::kRead});
   };
   read("--project_path", line.project_path);
   read("--GraphMatching.match_list_path", p.match_list_path);
   read("--VocabTreeMatching.match_list_path", p.image_list_path);
   read("--GraphMatching.ranking_path", ranking.ranking_path);
   if (!p.replay_path.empty()) {
-    AddDatabase("--GraphMatching.replay_path", p.replay_path, Use::kRead, &files);
+    AddDatabase("--GraphMatching.replay_path", p.replay_path, RunFile::Use::kRead, &files);
   }
   const std::filesystem::path& vectors = ranking.vectors.vectors_path;
   read("--GraphMatching.vectors_path", vectors);
   if (!vectors.empty()) {
-    files.push_back(
-        {"--GraphMatching.vectors_path with .txt", NamesPath(vectors), Use::kRead, vectors});
+    files.push_back({"--GraphMatching.vectors_path with .txt", NamesPath(vectors),
+                     RunFile::Use::kRead, vectors});
   }
   if (p.colmap_path.find('/') != std::string::npos) read("--colmap_path", p.colmap_path);
 
   const auto written = [&files](const char* option, const std::filesystem::path& path) {
-    if (!path.empty()) files.push_back({option, path, Use::kWritten});
+    if (!path.empty()) files.push_back({option, path, RunFile::Use::kWritten});
   };
   written("--GraphMatching.report", line.report_path);
   if (IsPage(line.report_path)) {
     files.push_back({"--GraphMatching.report with .json", JsonReportPath(line.report_path),
-                     Use::kWritten, line.report_path});
+                     RunFile::Use::kWritten, line.report_path});
   }
   written("--GraphMatching.export_pairs", line.pair_list_path);
   written("--GraphMatching.export_graph", line.graph_path);
   written("--GraphMatching.export_vectors", ranking.export_path);
   if (!ranking.export_path.empty()) {
     files.push_back({"--GraphMatching.export_vectors with .txt", NamesPath(ranking.export_path),
-                     Use::kWritten, ranking.export_path});
+                     RunFile::Use::kWritten, ranking.export_path});
   }
   const auto grows = [&files](const char* option, const std::filesystem::path& path) {
-    if (!path.empty()) files.push_back({option, path, Use::kGrows});
+    if (!path.empty()) files.push_back({option, path, RunFile::Use::kGrows});
   };
   grows("--GraphMatching.test_log", p.pair_log_path);
   grows("--log_path", line.log.FilePath());
@@ -92,7 +90,7 @@ std::vector<RunFile> FilesOfRun(const CommandLine& line) {
 
 void CheckThatFilesDiffer(const std::vector<RunFile>& files) {
   const auto is_output = [](const RunFile& file) {
-    return file.use == Use::kWritten || file.use == Use::kGrows;
+    return file.use == RunFile::Use::kWritten || file.use == RunFile::Use::kGrows;
   };
   for (const RunFile& file : files) {
     if (!is_output(file)) continue;
@@ -107,7 +105,7 @@ void CheckThatFilesDiffer(const std::vector<RunFile>& files) {
 
 void CheckOutputs(const std::vector<RunFile>& files) {
   for (const RunFile& file : files) {
-    if (file.use != Use::kWritten) continue;
+    if (file.use != RunFile::Use::kWritten) continue;
     CheckCanWrite(file.path);
     if (file.beside.empty() || IsOurs(file)) continue;
     throw FileError(file.option + " is " + file.path.string() +

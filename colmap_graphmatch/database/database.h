@@ -1,18 +1,19 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "colmap_graphmatch/base/camera.h"
 #include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/two_view_geometry.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/features.h"
 #include "colmap_graphmatch/database/sqlite.h"
+#include "colmap_graphmatch/database/two_view_geometry_codec.h"
 
 namespace colmap_graphmatch {
 
@@ -25,29 +26,6 @@ struct TestedPair {
   std::size_t num_inliers = 0;
   int config = 0;
 };
-
-// The matrices of a row of `two_view_geometries`, in the order of PairRows::geometry. A column that
-// a database does not have is left out of what is read from and written to it.
-inline constexpr std::array<const char*, 7> kGeometryColumns = {"F",    "E",       "H",      "qvec",
-                                                                "tvec", "camera1", "camera2"};
-
-// What COLMAP stores for a tested pair. Matches are num x 2 uint32 feature indices, row-major, the
-// feature of pair.id1 first; no bytes at all where there are no rows.
-struct PairRows {
-  ImagePair pair;
-  std::size_t num_matches = 0;
-  sqlite::Blob matches;
-  std::size_t num_inliers = 0;
-  sqlite::Blob inliers;
-  int config = 0;
-  std::array<std::optional<sqlite::Blob>, kGeometryColumns.size()> geometry;
-  // Of a pair with too few matches, which are not written: how many there were.
-  std::size_t num_dropped_matches = 0;
-};
-
-// True if COLMAP counts such a pair as an edge of the matching graph: enough inliers, and not
-// undefined (0), degenerate (1) or a watermark (7).
-bool IsEdge(std::size_t num_inliers, int config, std::size_t min_num_inliers);
 
 // The database of a user, made by any COLMAP from 3.8 on. Opening checks that it is one. Nothing in
 // it is changed but by WritePairs. Not thread-safe: every thread opens its own.
@@ -69,9 +47,11 @@ class Database {
   // The features of one image; no rows if it has none.
   Descriptors ReadDescriptors(ImageId image_id);
 
-  // Throws if there are not as many as when the images were listed.
-  Descriptors ReadDescriptors(const ImageRecord& image);
   Keypoints ReadKeypoints(ImageId image_id);
+
+  // Throw if there are not as many as when the images were listed.
+  Descriptors ReadDescriptors(const ImageRecord& image);
+  Keypoints ReadKeypoints(const ImageRecord& image);
 
   // What tells whether the features of an image are still the same: their number and the beginnings
   // of their descriptors and keypoints. Images without features are left out.
@@ -82,6 +62,9 @@ class Database {
   // as read before.
   void ExpectFeatures(const std::vector<ImageRecord>& images,
                       const std::vector<ImageFingerprint>& fingerprints);
+
+  // Every camera, as it is.
+  std::map<CameraId, Camera> ReadCameras();
 
   // The frame of every image that has one (COLMAP 3.12 and later): what the cameras of a rig took
   // at the same time.
@@ -94,11 +77,19 @@ class Database {
   // The same, judged by IsEdge.
   std::vector<VerifiedPair> ReadVerifiedPairs(std::size_t min_num_inliers);
 
+  // The matches of a pair, and the inlier matches of a tested one; none if there is no such row.
+  // Throw if they cannot be.
+  FeatureMatches ReadMatches(const ImagePair& pair);
+  FeatureMatches ReadInliers(const ImagePair& pair);
+
   // The number of matches of every pair that has a row in `matches`.
   std::unordered_map<ImagePair, std::size_t> ReadNumMatches();
 
   // The pairs that have matches, made elsewhere, and no two-view geometry yet, ascending.
   std::vector<ImagePair> ReadUnverifiedPairs();
+
+  // What COLMAPs that made databases like this one store for a pair with too few matches.
+  TwoViewConfiguration ConfigurationOfUnmatched() const { return unmatched_; }
 
   // Takes the write lock for a moment: that the database cannot be written should not be learnt
   // late.
@@ -112,22 +103,25 @@ class Database {
   // call goes through all pages of both tables, and throws if they are damaged. A pair that
   // another program has tested in the meantime is left as that program wrote it; returns those, as
   // they are in the database. Matrices are
-  // stored the way the COLMAP that made this database marks unset ones: zeros up to 3.8, NULL
-  // since.
-  std::vector<TestedPair> WritePairs(const std::vector<PairRows>& pairs);
+  // stored the way the COLMAP that made this database marks unset ones.
+  std::vector<TestedPair> WritePairs(const std::vector<PairGeometry>& pairs);
 
  private:
   void CheckSchema();
+  FeatureMatches ReadMatchesFrom(const std::string& table, const ImagePair& pair);
+  // Throws if these are not all features of the image.
+  void CheckNumber(std::size_t num_rows, const ImageRecord& image) const;
   // Whether the features of an image have this fingerprint.
   bool HasFeatures(const ImageRecord& image, std::int64_t features);
-  void CheckFeatures(const std::vector<PairRows>& pairs);
+  void CheckFeatures(const std::vector<PairGeometry>& pairs);
   [[noreturn]] void ThrowNotColmaps(const std::string& problem) const;
   // What `problem` says of the file is only possible if it is damaged.
   [[noreturn]] void ThrowDamaged(const std::string& problem) const;
 
   sqlite::Connection connection_;
-  bool unset_is_null_ = true;
-  std::vector<std::size_t> geometry_columns_;  // The indices in kGeometryColumns that exist here.
+  TwoViewGeometryCodec codec_{{}, false};
+  bool cameras_have_prior_ = false;
+  TwoViewConfiguration unmatched_ = TwoViewConfiguration::kUndefined;
   bool descriptors_have_type_ = false;
   bool pages_are_checked_ = false;
 

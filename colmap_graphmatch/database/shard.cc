@@ -1,19 +1,15 @@
 #include "colmap_graphmatch/database/shard.h"
 
 #include <algorithm>
-#include <cstring>
 #include <string>
+#include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/database/sqlite.h"
+#include "colmap_graphmatch/database/two_view_geometry_codec.h"
 
 namespace colmap_graphmatch {
 namespace {
-
-// The largest value of TwoViewGeometry::ConfigurationType (MULTIPLE).
-constexpr int kMaxConfig = 8;
-
-constexpr std::size_t kBytesPerMatch = 2 * sizeof(std::uint32_t);
 
 // "INSERT INTO table(common columns) SELECT common columns FROM source.table", so that databases of
 // different versions of COLMAP can be copied into each other. Columns without a counterpart take
@@ -35,26 +31,6 @@ std::string CopyTable(sqlite::Connection& shard, const std::string& table,
   return "INSERT INTO main." + table + "(" + names + ") SELECT " + values + " FROM source." + table;
 }
 
-sqlite::Blob CheckedMatches(const sqlite::Statement& row, int rows_column, int cols_column,
-                            int data_column, std::size_t num_features1, std::size_t num_features2) {
-  const std::int64_t rows = row.Int(rows_column);
-  sqlite::Blob matches = row.CopyBlob(data_column);
-  // Divided, not multiplied: a nonsensical number of rows must not overflow into a right one.
-  if (rows < 0 || matches.size() % kBytesPerMatch != 0 ||
-      matches.size() / kBytesPerMatch != static_cast<std::size_t>(rows) ||
-      (rows > 0 && row.Int(cols_column) != 2)) {
-    throw DatabaseError("a blob of matches of the wrong size");
-  }
-  for (std::size_t offset = 0; offset < matches.size(); offset += kBytesPerMatch) {
-    std::array<std::uint32_t, 2> match = {};
-    std::memcpy(match.data(), matches.data() + offset, kBytesPerMatch);
-    if (match[0] >= num_features1 || match[1] >= num_features2) {
-      throw DatabaseError("a match of features that the images do not have");
-    }
-  }
-  return matches;
-}
-
 std::size_t NumKeypoints(sqlite::Connection& shard, ImageId image_id) {
   sqlite::Statement select(shard, "SELECT rows FROM main.keypoints WHERE image_id = ?1");
   const bool found = select.Bind(1, std::int64_t{image_id}).Step();
@@ -67,7 +43,7 @@ void CheckCopiedMatches(sqlite::Connection& shard, const std::filesystem::path& 
   while (select.Step()) {
     const ImagePair pair = DecodePair(static_cast<PairId>(select.Int(3)));
     try {
-      CheckedMatches(select, 0, 1, 2, NumKeypoints(shard, pair.id1), NumKeypoints(shard, pair.id2));
+      DecodeMatches(select, 0, NumKeypoints(shard, pair.id1), NumKeypoints(shard, pair.id2));
     } catch (const DatabaseError& error) {
       throw DatabaseError(
           "The matches that " + database_path.string() + " has for the images with ids " +
@@ -123,13 +99,12 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
   CheckCopiedMatches(shard, database_path);
   sqlite::Statement add_matches(
       shard,
-      "INSERT OR REPLACE INTO main.matches(pair_id, rows, cols, data) VALUES(?1, ?2, 2, ?3)");
+      "INSERT OR REPLACE INTO main.matches(pair_id, rows, cols, data) VALUES(?1, ?2, ?3, ?4)");
   for (const auto& [pair, matches] : pairs) {
     if (!matches) continue;
-    add_matches.Bind(1, static_cast<std::int64_t>(EncodePair(pair)))
-        .Bind(2, static_cast<std::int64_t>(matches->size() / kBytesPerMatch))
-        .Bind(3, *matches)
-        .Run();
+    add_matches.Bind(1, static_cast<std::int64_t>(EncodePair(pair)));
+    BindMatches(*matches, 2, &add_matches);
+    add_matches.Run();
   }
   if (!with_descriptors) {
     sqlite::Statement has_matches(shard, "SELECT 1 FROM main.matches WHERE pair_id = ?1");
@@ -145,65 +120,37 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
   transaction.Commit();
 }
 
-std::vector<PairRows> ReadShard(const std::filesystem::path& shard_path,
-                                const std::vector<ShardPair>& pairs,
-                                const std::map<ImageId, std::size_t>& num_features) {
+std::vector<PairGeometry> ReadShard(const std::filesystem::path& shard_path,
+                                    const std::vector<ImagePair>& pairs,
+                                    const std::map<ImageId, std::size_t>& num_features) {
   sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, 0);
-  const std::vector<std::string> existing = shard.Columns("two_view_geometries");
-  std::string columns = "rows, cols, data, config";
-  std::vector<std::size_t> geometry_columns;
-  for (std::size_t i = 0; i < kGeometryColumns.size(); ++i) {
-    if (std::find(existing.begin(), existing.end(), kGeometryColumns[i]) == existing.end())
-      continue;
-    columns += std::string(", ") + kGeometryColumns[i];
-    geometry_columns.push_back(i);
-  }
+  const TwoViewGeometryCodec codec(shard.Columns("two_view_geometries"), false);
   sqlite::Statement select_matches(shard,
                                    "SELECT rows, cols, data FROM matches WHERE pair_id = ?1");
-  sqlite::Statement select_geometry(
-      shard, "SELECT " + columns + " FROM two_view_geometries WHERE pair_id = ?1");
+  sqlite::Statement select_geometry(shard, "SELECT " + JoinColumns(codec.Columns()) +
+                                               " FROM two_view_geometries WHERE pair_id = ?1");
 
-  std::vector<PairRows> results;
+  std::vector<PairGeometry> results;
   results.reserve(pairs.size());
-  for (const ShardPair& shard_pair : pairs) {
-    const ImagePair& pair = shard_pair.pair;
+  for (const ImagePair& pair : pairs) {
     const auto pair_id = static_cast<std::int64_t>(EncodePair(pair));
-    PairRows rows;
-    rows.pair = pair;
+    PairGeometry result;
+    result.pair = pair;
     try {
       if (!select_matches.Bind(1, pair_id).Step() || !select_geometry.Bind(1, pair_id).Step()) {
         throw DatabaseError("no result");
       }
       const std::size_t num1 = num_features.at(pair.id1);
       const std::size_t num2 = num_features.at(pair.id2);
-      rows.matches = CheckedMatches(select_matches, 0, 1, 2, num1, num2);
-      rows.num_matches = static_cast<std::size_t>(select_matches.Int(0));
-      rows.inliers = CheckedMatches(select_geometry, 0, 1, 2, num1, num2);
-      rows.num_inliers = static_cast<std::size_t>(select_geometry.Int(0));
-      const std::int64_t config = select_geometry.Int(3);
-      if (config < 0 || config > kMaxConfig) {
-        throw DatabaseError("the unknown configuration " + std::to_string(config));
-      }
-      rows.config = static_cast<int>(config);
-      int column = 4;
-      for (const std::size_t i : geometry_columns) {
-        if (!select_geometry.IsNull(column)) {
-          rows.geometry[i] = select_geometry.CopyBlob(column);
-          const std::size_t expected = i < 3 ? 72 : i == 3 ? 32 : 24;
-          if (i < 5 && rows.geometry[i]->size() != expected) {
-            throw DatabaseError(std::string("a matrix ") + kGeometryColumns[i] +
-                                " of the wrong size");
-          }
-        }
-        ++column;
-      }
+      result.matches = DecodeMatches(select_matches, 0, num1, num2);
+      result.geometry = codec.Decode(select_geometry, 0, num1, num2);
     } catch (const DatabaseError& error) {
       throw DatabaseError("COLMAP wrote " + std::string(error.what()) + " for the pair of images " +
                           std::to_string(pair.id1) + " and " + std::to_string(pair.id2) + ".");
     }
     select_matches.Reset();
     select_geometry.Reset();
-    results.push_back(std::move(rows));
+    results.push_back(std::move(result));
   }
   return results;
 }

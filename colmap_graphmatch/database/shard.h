@@ -20,8 +20,8 @@ std::string ShardImageName(ImageId image_id);
 struct ShardPair {
   ImagePair pair;
 
-  // num x 2 uint32 feature indices, for COLMAP to verify; none: COLMAP matches the pair itself.
-  std::optional<sqlite::Blob> matches;
+  // For COLMAP to verify; none: COLMAP matches the pair itself.
+  std::optional<FeatureMatches> matches;
 };
 
 // Copies the cameras, images and keypoints of the pairs' images from the user's database into the
@@ -37,8 +37,8 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
 // What COLMAP wrote into the shard for the pairs. Throws DatabaseError if a pair has no result, or
 // one that cannot be: wrong sizes, features that the images do not have (num_features, by image),
 // unknown configurations.
-std::vector<PairRows> ReadShard(const std::filesystem::path& shard_path,
-                                const std::vector<ShardPair>& pairs,
-                                const std::map<ImageId, std::size_t>& num_features);
+std::vector<PairGeometry> ReadShard(const std::filesystem::path& shard_path,
+                                    const std::vector<ImagePair>& pairs,
+                                    const std::map<ImageId, std::size_t>& num_features);
 
 }  // namespace colmap_graphmatch

@@ -112,6 +112,7 @@ class Statement {
   // The blob is not copied: it must outlive the next Step. An empty blob is bound as NULL, which is
   // what COLMAP stores for a matrix without rows.
   Statement& Bind(int parameter, const Blob& blob);
+  Statement& BindBytes(int parameter, const void* data, std::size_t size);
   Statement& BindNull(int parameter);
 
   // True if there is a row.

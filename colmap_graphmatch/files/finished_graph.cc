@@ -4,6 +4,7 @@
 #include <boost/algorithm/string/classification.hpp>
 #include <boost/algorithm/string/split.hpp>
 #include <boost/lexical_cast/try_lexical_convert.hpp>
+#include <memory>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -33,6 +34,10 @@ class Reader {
     graph_.pairs[ImagePair(id1->second, id2->second)] = replayed;
   }
 
+  void SetInliers(std::function<FeatureMatches(const ImagePair&)> read_inliers) {
+    graph_.read_inliers = std::move(read_inliers);
+  }
+
   FinishedGraph Finish() {
     for (const auto& [pair, replayed] : graph_.pairs) graph_.num_edges += replayed.is_edge ? 1 : 0;
     return std::move(graph_);
@@ -45,12 +50,16 @@ class Reader {
 };
 
 void ReadDatabase(const std::filesystem::path& path, const sqlite::LockPatience& patience,
-                  Reader* reader) {
-  Database database(path, sqlite::Access::kRead, patience);
+                  const std::vector<ImageRecord>& images, Reader* reader) {
+  const auto database = std::make_shared<Database>(path, sqlite::Access::kRead, patience);
   std::unordered_map<ImageId, std::string> names;
-  for (const ImageRecord& image : database.ReadImages()) names[image.id] = image.name;
-  const std::unordered_map<ImagePair, std::size_t> num_matches = database.ReadNumMatches();
-  for (const TestedPair& tested : database.ReadTestedPairs()) {
+  std::unordered_map<std::string, ImageId> replayed_ids;
+  for (const ImageRecord& image : database->ReadImages()) {
+    names[image.id] = image.name;
+    replayed_ids[image.name] = image.id;
+  }
+  const std::unordered_map<ImagePair, std::size_t> num_matches = database->ReadNumMatches();
+  for (const TestedPair& tested : database->ReadTestedPairs()) {
     const auto name1 = names.find(tested.pair.id1);
     const auto name2 = names.find(tested.pair.id2);
     if (name1 == names.end() || name2 == names.end()) continue;
@@ -58,6 +67,22 @@ void ReadDatabase(const std::filesystem::path& path, const sqlite::LockPatience&
     reader->Add(name1->second, name2->second, tested.num_inliers, tested.config,
                 matches == num_matches.end() ? tested.num_inliers : matches->second);
   }
+  // By the ids of the images here, which may have another order there.
+  std::unordered_map<ImageId, ImageId> ids;
+  for (const ImageRecord& image : images) {
+    const auto replayed = replayed_ids.find(image.name);
+    if (replayed != replayed_ids.end()) ids[image.id] = replayed->second;
+  }
+  reader->SetInliers([database, ids = std::move(ids)](const ImagePair& pair) -> FeatureMatches {
+    const auto id1 = ids.find(pair.id1);
+    const auto id2 = ids.find(pair.id2);
+    if (id1 == ids.end() || id2 == ids.end()) return {};
+    FeatureMatches inliers = database->ReadInliers(ImagePair(id1->second, id2->second));
+    if (id1->second > id2->second) {
+      for (FeatureMatch& match : inliers) std::swap(match.feature1, match.feature2);
+    }
+    return inliers;
+  });
 }
 
 void ReadList(const std::filesystem::path& path, const StopRequest* stop, Reader* reader) {
@@ -96,7 +121,7 @@ FinishedGraph ReadFinishedGraph(const std::filesystem::path& path,
                                 const sqlite::LockPatience& patience) {
   Reader reader(images, min_num_inliers);
   if (IsSqliteFile(path)) {
-    ReadDatabase(path, patience, &reader);
+    ReadDatabase(path, patience, images, &reader);
   } else {
     ReadList(path, patience.stop, &reader);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -14,6 +15,9 @@ namespace colmap_graphmatch {
 struct FinishedGraph {
   std::unordered_map<ImagePair, ReplayedPair> pairs;
   std::size_t num_edges = 0;
+
+  // Of a database: reads the inlier matches of a pair. Empty for a list, which has none.
+  std::function<FeatureMatches(const ImagePair&)> read_inliers;
 
   // Lines or pairs of images that the database does not have, or that have no features there.
   std::size_t num_skipped = 0;

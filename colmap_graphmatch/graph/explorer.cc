@@ -10,18 +10,19 @@ ExplorationResult Explore(PairProposer& proposer, const std::vector<ImageId>& im
                           PairVerifier& verifier, const OnProgress& on_progress,
                           const KnownPairsPolicy& known) {
   GraphBuilder builder(image_ids, verifier, on_progress);
-  if (!known.seeds.empty() && builder.AddKnown(known.seeds)) proposer.OnKnown(builder.Graph());
+  if (!known.seeds.empty() && builder.AddKnown(known.seeds, proposer))
+    proposer.OnKnown(builder.Graph());
   while (builder.Continues()) {
     if (const std::optional<Proposal> proposal = proposer.Next(builder.Graph())) {
       proposer.OnTested(builder.Verify(*proposal, proposer));
-    } else if (known.others_join_in_the_end && builder.AddKnown()) {
+    } else if (known.others_join_in_the_end && builder.AddKnown(proposer)) {
       proposer.OnKnown(builder.Graph());
     } else {
       break;
     }
   }
   // A run that was stopped may not have come to all of it.
-  if (known.others_join_in_the_end) builder.AddKnown();
+  if (known.others_join_in_the_end) builder.AddKnown(proposer);
   return builder.Finish();
 }
 

@@ -4,14 +4,15 @@
 #include <functional>
 #include <vector>
 
-#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/base/verified_pair.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
 #include "colmap_graphmatch/graph/stages.h"
 
 namespace colmap_graphmatch {
 
 class PairProposer;
+class PairVerifier;
 
 // Where a run is after a pair was verified.
 struct LoopProgress {

@@ -37,9 +37,11 @@ std::vector<TestedVertexPair> GraphBuilder::KnownOutsideGraph() const {
   return pairs;
 }
 
-bool GraphBuilder::AddKnown() { return AddSeeds(KnownOutsideGraph()); }
+bool GraphBuilder::AddKnown(PairProposer& proposer) {
+  return AddSeeds(KnownOutsideGraph(), proposer);
+}
 
-bool GraphBuilder::AddKnown(const std::vector<ImagePair>& pairs) {
+bool GraphBuilder::AddKnown(const std::vector<ImagePair>& pairs, PairProposer& proposer) {
   std::vector<TestedVertexPair> seeds = KnownOutsideGraph();
   const auto is_listed = [&](const TestedVertexPair& known) {
     return std::binary_search(
@@ -47,11 +49,18 @@ bool GraphBuilder::AddKnown(const std::vector<ImagePair>& pairs) {
         ImagePair(image_ids_[known.pair.first], image_ids_[known.pair.second]));
   };
   seeds.erase(std::remove_if(seeds.begin(), seeds.end(), std::not_fn(is_listed)), seeds.end());
-  return AddSeeds(seeds);
+  return AddSeeds(seeds, proposer);
 }
 
-bool GraphBuilder::AddSeeds(const std::vector<TestedVertexPair>& seeds) {
+void GraphBuilder::Tell(const TestedVertexPair& pair, PairProposer& proposer) {
+  proposer.OnVerified(pair, [this, &pair]() -> const FeatureMatches& {
+    return verifier_.Inliers(ImagePair(image_ids_[pair.pair.first], image_ids_[pair.pair.second]));
+  });
+}
+
+bool GraphBuilder::AddSeeds(const std::vector<TestedVertexPair>& seeds, PairProposer& proposer) {
   for (const TestedVertexPair& seed : seeds) {
+    Tell(seed, proposer);
     if (!seed.is_edge) continue;
     ++result_.num_seed_edges;
     components_.AddEdge(seed.pair);
@@ -61,7 +70,7 @@ bool GraphBuilder::AddSeeds(const std::vector<TestedVertexPair>& seeds) {
   return !seeds.empty();
 }
 
-StageStatistics GraphBuilder::Verify(const Proposal& proposal, const PairProposer& proposer) {
+StageStatistics GraphBuilder::Verify(const Proposal& proposal, PairProposer& proposer) {
   StageStatistics batch;
   const Stopwatch stopwatch;
   const ExpectedTests after =
@@ -92,6 +101,7 @@ StageStatistics GraphBuilder::Verify(const Proposal& proposal, const PairPropose
     }
     if (is_edge) components_.AddEdge(pair);
     tested.push_back({pair, is_edge});
+    Tell(tested.back(), proposer);
     batch.seconds = stopwatch.Seconds();
     total = before + batch;
     LoopProgress progress;

@@ -21,12 +21,12 @@ class GraphBuilder {
   const MatchingGraph& Graph() const { return graph_; }
 
   // Adds the known pairs that are not in the graph: all, or those of an ascending list. Returns
-  // true if there were any.
-  bool AddKnown();
-  bool AddKnown(const std::vector<ImagePair>& pairs);
+  // true if there were any. The proposer is told of each.
+  bool AddKnown(PairProposer& proposer);
+  bool AddKnown(const std::vector<ImagePair>& pairs, PairProposer& proposer);
 
   // Has the proposed pairs tested, and adds them. Returns the statistics of this batch alone.
-  StageStatistics Verify(const Proposal& proposal, const PairProposer& proposer);
+  StageStatistics Verify(const Proposal& proposal, PairProposer& proposer);
 
   // False once the verifier was asked to stop: nothing more is to be verified.
   bool Continues() const { return result_.finished; }
@@ -36,7 +36,8 @@ class GraphBuilder {
 
  private:
   std::vector<TestedVertexPair> KnownOutsideGraph() const;
-  bool AddSeeds(const std::vector<TestedVertexPair>& seeds);
+  bool AddSeeds(const std::vector<TestedVertexPair>& seeds, PairProposer& proposer);
+  void Tell(const TestedVertexPair& pair, PairProposer& proposer);
   void KeepIteration(const Proposal& proposal, const StageStatistics& batch);
   void Report(LoopProgress progress, std::size_t num_edges_in_batch);
 

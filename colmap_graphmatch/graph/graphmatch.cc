@@ -4,7 +4,6 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/graph/explorer.h"
-#include "colmap_graphmatch/graph/graph_builder.h"
 #include "colmap_graphmatch/graph/propagation.h"
 
 namespace colmap_graphmatch {
@@ -62,7 +61,7 @@ namespace {
 // Answers what was known before the run and takes everything else for no edge.
 class KnownOnly : public PairVerifier {
  public:
-  explicit KnownOnly(const PairVerifier& verifier) : known_(verifier.KnownPairs()) {}
+  explicit KnownOnly(PairVerifier& verifier) : verifier_(verifier), known_(verifier.KnownPairs()) {}
 
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_; }
 
@@ -75,22 +74,29 @@ class KnownOnly : public PairVerifier {
     return true;
   }
 
+  const FeatureMatches& Inliers(const ImagePair& pair) override { return verifier_.Inliers(pair); }
+
  private:
+  PairVerifier& verifier_;
   const std::vector<VerifiedPair>& known_;
+};
+
+class ProposesNothing : public PairProposer {
+ public:
+  std::optional<Proposal> Next(const MatchingGraph& /*graph*/) override { return std::nullopt; }
 };
 
 }  // namespace
 
 std::vector<ImagePair> ChooseSeeds(const GraphMatchOptions& options, const Ranking& ranking,
-                                   const std::vector<ImageId>& image_ids,
-                                   const PairVerifier& verifier, ThreadPool& threads,
+                                   const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                                   ThreadPool& threads,
                                    const std::vector<ImagePair>& earlier_seeds) {
   if (verifier.KnownPairs().empty()) return {};
   KnownOnly known_only(verifier);
   const OnProgress silent;
-  GraphBuilder of_known(image_ids, known_only, silent);
-  of_known.AddKnown();
-  const std::size_t num_known = of_known.Finish().num_seed_pairs;
+  ProposesNothing nothing;
+  const std::size_t num_known = Explore(nothing, image_ids, known_only, silent).num_seed_pairs;
   const auto asks_for_all_known = [&](const std::vector<ImagePair>& seeds) {
     GraphMatchProposer proposer(options, ranking, threads);
     const ExplorationResult rehearsed =

@@ -48,8 +48,8 @@ class GraphMatchProposer : public PairProposer {
 // or from none, asks for everything that is known, these are the seeds. Otherwise another matcher
 // tested pairs, or images were added, and all known pairs are.
 std::vector<ImagePair> ChooseSeeds(const GraphMatchOptions& options, const Ranking& ranking,
-                                   const std::vector<ImageId>& image_ids,
-                                   const PairVerifier& verifier, ThreadPool& threads,
+                                   const std::vector<ImageId>& image_ids, PairVerifier& verifier,
+                                   ThreadPool& threads,
                                    const std::vector<ImagePair>& earlier_seeds);
 
 }  // namespace colmap_graphmatch

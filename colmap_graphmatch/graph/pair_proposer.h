@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "colmap_graphmatch/base/two_view_geometry.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
 #include "colmap_graphmatch/graph/stages.h"
 
@@ -30,6 +31,11 @@ class PairProposer {
 
   // The next pairs to test; none if it has no more to propose as things stand.
   virtual std::optional<Proposal> Next(const MatchingGraph& graph) = 0;
+
+  // A pair of the last proposal was verified, or one that others had tested joins the graph; the
+  // graph has it after the next OnTested or OnKnown. Pairs come in any order, so what is made of
+  // them must not depend on it. inliers may be called until this returns.
+  virtual void OnVerified(const TestedVertexPair& /*pair*/, const InlierReader& /*inliers*/) {}
 
   // What became of the last proposal, which is in the graph by then.
   virtual void OnTested(const StageStatistics& /*batch*/) {}

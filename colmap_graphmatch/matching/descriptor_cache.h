@@ -19,12 +19,14 @@
 
 namespace colmap_graphmatch {
 
-// What matching needs of one image: num x 128 descriptors, row-major.
+// What matching needs of one image: num x 128 descriptors, row-major, and, if somebody asks where
+// matches are, num x 2 positions (x, y) in pixels.
 struct MatchingFeatures {
   std::vector<std::uint8_t> descriptors;
+  std::vector<float> positions = {};
 
   DescriptorView View() const { return {descriptors.data(), descriptors.size() / kDescriptorDim}; }
-  std::size_t NumBytes() const { return descriptors.size(); }
+  std::size_t NumBytes() const { return descriptors.size() + positions.size() * sizeof(float); }
 };
 
 // Features of the images that were used last, bounded in bytes, read by threads of its own. All

@@ -52,14 +52,15 @@ bool DescriptorMatcher::Passes(std::int32_t best, std::int32_t second) const {
   return angle <= max_distance_ && angle < max_ratio_ * Angle(second);
 }
 
-std::vector<FeatureMatch> DescriptorMatcher::Match(const DescriptorView& image1,
-                                                   const DescriptorView& image2) {
+FeatureMatches DescriptorMatcher::Match(const DescriptorView& image1, const DescriptorView& image2,
+                                        std::vector<float>* distinctness) {
   const auto limit = static_cast<std::size_t>(options_.max_num_matches);
   const DescriptorView a{image1.data, std::min(image1.num, limit)};
   const DescriptorView b{image2.data, std::min(image2.num, limit)};
   ComputeTopTwo(a, b, &buffers_, &top_two_);
 
-  std::vector<FeatureMatch> matches;
+  FeatureMatches matches;
+  if (distinctness != nullptr) distinctness->clear();
   for (std::size_t i = 0; i < a.num; ++i) {
     const std::int32_t best = top_two_.best_of_a[i];
     if (!Passes(best, top_two_.second_of_a[i])) continue;
@@ -73,6 +74,9 @@ std::vector<FeatureMatch> DescriptorMatcher::Match(const DescriptorView& image1,
       }
     }
     matches.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j)});
+    if (distinctness != nullptr) {
+      distinctness->push_back(1 - Angle(best) / Angle(top_two_.second_of_a[i]));
+    }
   }
   return matches;
 }

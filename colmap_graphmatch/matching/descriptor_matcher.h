@@ -4,21 +4,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "colmap_graphmatch/base/two_view_geometry.h"
 #include "colmap_graphmatch/matching/options.h"
 #include "colmap_graphmatch/matching/top_two.h"
 
 namespace colmap_graphmatch {
-
-// A pair of corresponding features, by their rows in the two images; laid out as COLMAP stores it.
-struct FeatureMatch {
-  std::uint32_t feature1 = 0;
-  std::uint32_t feature2 = 0;
-
-  friend bool operator==(const FeatureMatch& a, const FeatureMatch& b) {
-    return a.feature1 == b.feature1 && a.feature2 == b.feature2;
-  }
-};
-static_assert(sizeof(FeatureMatch) == 2 * sizeof(std::uint32_t));
 
 // Exact descriptor matching under COLMAP's rule (FindBestMatchesBruteForce in
 // src/colmap/feature/sift.cc): the angle of two descriptors is acos(product / 512^2), in single
@@ -32,8 +22,11 @@ class DescriptorMatcher {
  public:
   explicit DescriptorMatcher(const DescriptorMatchingOptions& options);
 
-  // By ascending feature1. Either image may have no descriptors.
-  std::vector<FeatureMatch> Match(const DescriptorView& image1, const DescriptorView& image2);
+  // By ascending feature1. Either image may have no descriptors. distinctness: of every match how
+  // much nearer it is than the second nearest of the second image, from 0 (just as near) to 1;
+  // may be null.
+  FeatureMatches Match(const DescriptorView& image1, const DescriptorView& image2,
+                       std::vector<float>* distinctness = nullptr);
 
  private:
   bool Passes(std::int32_t best, std::int32_t second) const;

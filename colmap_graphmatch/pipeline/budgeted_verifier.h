@@ -27,6 +27,7 @@ class BudgetedVerifier : public PairVerifier {
   const std::vector<VerifiedPair>& KnownPairs() const override { return verifier_.KnownPairs(); }
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override;
+  const FeatureMatches& Inliers(const ImagePair& pair) override { return verifier_.Inliers(pair); }
 
   // What ended the run; kNone as long as nothing did.
   Limit Reached() const { return reached_; }

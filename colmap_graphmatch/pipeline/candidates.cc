@@ -40,7 +40,7 @@ CandidateList FindCandidates(const PipelineOptions& options, const StopRequest& 
   RunSetup setup(RunKind::kCandidates, options, stop, observer);
   setup.ReadLists();
   const std::vector<VerifiedPair> known = setup.database->ReadVerifiedPairs(
-      static_cast<std::size_t>(options.verification.min_num_inliers));
+      static_cast<std::size_t>(options.verification.geometry.min_num_inliers));
   const RankedImages ranked = RankImages(setup, known);
   RetrievalOptions draws = DrawsOf(options, ranked.images.size());
   draws.restrictions = setup.RestrictionsOf(ranked.images);

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/base/verified_pair.h"
 #include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/pipeline/result.h"
 #include "colmap_graphmatch/ranking/ranking.h"

@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/base/verified_pair.h"
 #include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/vectors/options.h"
 
@@ -44,14 +44,17 @@ struct RunDetails {
   std::vector<ImageWithoutEdge> images_without_edge;
 };
 
-// What verification by COLMAP took.
+// What verification took.
 struct VerificationCost {
   double matching_seconds = 0;      // CPU time of matching descriptors here, summed over threads.
   std::size_t num_matched = 0;      // Pairs whose descriptors were matched here.
   std::size_t num_image_reads = 0;  // For that.
+  double screening_seconds = 0;     // CPU time of fits before COLMAP, summed over threads.
+  std::size_t num_screened = 0;     // Pairs,
+  std::size_t num_settled = 0;      // and those of them that COLMAP did not get.
   double colmap_seconds = 0;        // In which COLMAP ran, summed over processes.
   std::size_t num_verified = 0;     // Pairs, by COLMAP.
-  std::size_t num_failed = 0;       // Pairs on which COLMAP failed.
+  std::size_t num_failed = 0;       // Pairs on which the geometric verification failed.
 };
 
 // What verification would have taken that was replayed.

@@ -1,5 +1,6 @@
 #include "colmap_graphmatch/pipeline/run_verification.h"
 
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -8,43 +9,61 @@
 #include "colmap_graphmatch/files/text_file.h"
 #include "colmap_graphmatch/matching/top_two.h"
 #include "colmap_graphmatch/verification/batch_verifier.h"
+#include "colmap_graphmatch/verification/chosen_verifier.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
-#include "colmap_graphmatch/verification/colmap_verifier.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 
 namespace colmap_graphmatch {
 namespace {
 
-class ByColmap : public RunVerification {
+std::optional<ColmapInstallation> FindColmap(const RunSetup& setup, const WorkDirectory& work) {
+  const bool is_needed =
+      setup.options.verification.verifier != VerificationOptions::Verifier::kNative;
+  if (!is_needed) return std::nullopt;
+  return DetectColmap(setup.options.colmap_path, work.Path(), setup.stop);
+}
+
+const char* DescriptionOf(VerificationOptions::Verifier verifier) {
+  switch (verifier) {
+    case VerificationOptions::Verifier::kNative:
+      return "Pairs are verified by this program.";
+    case VerificationOptions::Verifier::kScreened:
+      return "Pairs are verified by COLMAP, after a fast fit.";
+    case VerificationOptions::Verifier::kColmap:
+      break;
+  }
+  return "Pairs are verified by COLMAP.";
+}
+
+class ByMatching : public RunVerification {
  public:
-  explicit ByColmap(RunSetup& setup)
+  explicit ByMatching(RunSetup& setup)
       : database_(*setup.database),
         work_(setup.options.work_path, WorkDirectory::Guard::kGuarded),
-        colmap_(DetectColmap(setup.options.colmap_path, work_.Path(), setup.stop)),
-        plan_(PlanVerification(setup.options.verification, setup.options.num_threads, colmap_)),
-        geometry_(setup.options.verification, plan_, colmap_, database_.Path(), setup.images,
-                  work_.Path(), setup.stop, setup.messages.warn),
-        verifier_(setup.options.verification, plan_, geometry_, database_, setup.images, setup.stop,
-                  setup.messages.warn) {
-    setup.messages.info(
-        std::string("Descriptors are matched ") +
-        (plan_.matches_here ? std::string("exactly, with ") + TopTwoTarget() + "." : "by COLMAP."));
-    setup.messages.info("COLMAP " + colmap_.Version() + " at " + colmap_.executable.string() +
-                        ", " + (plan_.uses_gpu ? "GPU" : "CPU") +
-                        ", processes: " + std::to_string(plan_.num_processes) +
-                        ", threads in each: " + std::to_string(plan_.threads_per_process) + ".");
+        colmap_(FindColmap(setup, work_)),
+        plan_(PlanVerification(setup.options.verification, setup.options.num_threads,
+                               colmap_.value_or(ColmapInstallation()))),
+        geometry_(setup.options.verification, plan_, colmap_, database_, setup.images, work_.Path(),
+                  setup.stop, setup.messages.warn),
+        verifier_(setup.options.verification, plan_, geometry_.Get(), database_, setup.images,
+                  setup.stop, setup.messages.warn) {
+    Announce(setup.messages);
   }
 
   PairVerifier& Verifier() override { return verifier_; }
 
   std::variant<VerificationCost, ReplayCost> Cost() const override {
     const MatchingStatistics matching = verifier_.Statistics();
-    const ColmapVerifier::Statistics colmap = geometry_.SoFar();
+    const ScreenedVerifier::Statistics screening = geometry_.Screening();
+    const ColmapVerifier::Statistics colmap = geometry_.Colmap();
     VerificationCost cost;
     cost.matching_seconds = matching.seconds;
     cost.num_matched = matching.num_matched;
     cost.num_image_reads = matching.num_image_reads;
+    cost.screening_seconds = screening.seconds;
+    cost.num_screened = screening.num_screened;
+    cost.num_settled = screening.num_settled;
     cost.colmap_seconds = colmap.seconds;
     cost.num_verified = colmap.num_verified;
     cost.num_failed = matching.num_failed;
@@ -54,11 +73,24 @@ class ByColmap : public RunVerification {
   void Finish() override { database_.CheckInPlace(); }
 
  private:
+  void Announce(const Messages& messages) const {
+    messages.info(
+        std::string("Descriptors are matched ") +
+        (plan_.matches_here ? std::string("exactly, with ") + TopTwoTarget() + "." : "by COLMAP."));
+    if (colmap_) {
+      messages.info("COLMAP " + colmap_->Version() + " at " + colmap_->executable.string() + ", " +
+                    (plan_.uses_gpu ? "GPU" : "CPU") +
+                    ", processes: " + std::to_string(plan_.num_processes) +
+                    ", threads in each: " + std::to_string(plan_.threads_per_process) + ".");
+    }
+    messages.info(DescriptionOf(plan_.verifier));
+  }
+
   Database& database_;
   WorkDirectory work_;
-  ColmapInstallation colmap_;
+  std::optional<ColmapInstallation> colmap_;  // Nothing, if there is no need of one.
   VerificationPlan plan_;
-  ColmapVerifier geometry_;
+  ChosenVerifier geometry_;
   BatchVerifier verifier_;
 };
 
@@ -67,6 +99,7 @@ class ByReplay : public RunVerification {
   ByReplay(RunSetup& setup, FinishedGraph graph) : verifier_(std::move(graph.pairs)) {
     std::unordered_map<ImageId, std::size_t> num_features;
     for (const ImageRecord& image : setup.images) num_features[image.id] = image.num_features;
+    verifier_.SetInliers(std::move(graph.read_inliers));
     verifier_.SetStop(&setup.stop);
     verifier_.SetCosts(std::move(num_features), setup.threads.NumThreads());
   }
@@ -84,7 +117,7 @@ class ByReplay : public RunVerification {
 std::unique_ptr<RunVerification> MakeReplay(RunSetup& setup) {
   const std::filesystem::path& path = setup.options.replay_path;
   FinishedGraph graph = ReadFinishedGraph(
-      path, setup.images, setup.options.verification.min_num_inliers, setup.Patience());
+      path, setup.images, setup.options.verification.geometry.min_num_inliers, setup.Patience());
   WarnOfSkippedLines(graph, path, "two different images", setup.messages);
   setup.messages.info("Replays the matching graph of " + path.string() + ", with " +
                       std::to_string(graph.num_edges) +
@@ -96,7 +129,7 @@ std::unique_ptr<RunVerification> MakeReplay(RunSetup& setup) {
 
 std::unique_ptr<RunVerification> MakeRunVerification(RunSetup& setup) {
   if (!setup.options.replay_path.empty()) return MakeReplay(setup);
-  return std::make_unique<ByColmap>(setup);
+  return std::make_unique<ByMatching>(setup);
 }
 
 }  // namespace colmap_graphmatch

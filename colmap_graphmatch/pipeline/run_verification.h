@@ -10,8 +10,9 @@
 
 namespace colmap_graphmatch {
 
-// What answers the pairs of a run, with all that it needs for that: COLMAP, or a finished matching
-// graph that is replayed. A new way to verify pairs is another one of these.
+// What answers the pairs of a run, with all that it needs for that: matching and geometric
+// verification, or a finished matching graph that is replayed. A new way to verify pairs is another
+// one of these.
 class RunVerification {
  public:
   virtual ~RunVerification() = default;

@@ -36,7 +36,7 @@ std::string LoopKey(const PipelineOptions& options, const PairRestrictions& rest
   GraphMatchOptions graph = LoopOptionsOf(options);
   graph.restrictions = restrictions;
   return "loop: " + graph.Key() + ", inliers " +
-         std::to_string(options.verification.min_num_inliers);
+         std::to_string(options.verification.geometry.min_num_inliers);
 }
 
 std::unique_ptr<PairProposer> MakeRankingProposer(const PipelineOptions& options,

@@ -26,8 +26,8 @@ struct EdgeProperties {
   std::size_t inliers = 0;
 };
 
-using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS, ImageProperties,
-                                    EdgeProperties>;
+using ExportedGraph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS,
+                                            ImageProperties, EdgeProperties>;
 
 // What XML and the language of Graphviz can hold: UTF-8 without control characters.
 std::string PrintableName(const std::string& name) {
@@ -41,9 +41,9 @@ std::string PrintableName(const std::string& name) {
   return printable;
 }
 
-Graph MakeGraph(const RunDetails& details) {
+ExportedGraph MakeGraph(const RunDetails& details) {
   const std::vector<GraphEdge> edges = EdgesOf(details, ImageIndex(details.images));
-  Graph graph(details.images.size());
+  ExportedGraph graph(details.images.size());
   for (std::size_t i = 0; i < details.images.size(); ++i) {
     graph[i] = {details.images[i].id, PrintableName(details.images[i].name), 0};
   }
@@ -99,7 +99,7 @@ PairListNames WritePairList(const std::filesystem::path& path, const CandidateLi
 }
 
 void WriteGraph(const std::filesystem::path& path, const RunDetails& details) {
-  Graph graph = MakeGraph(details);
+  ExportedGraph graph = MakeGraph(details);
   const bool is_dot = path.extension() == ".dot" || path.extension() == ".gv";
   if (is_dot) {
     // Boost escapes quotation marks alone.

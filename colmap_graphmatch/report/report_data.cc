@@ -108,7 +108,7 @@ ReportDetails MakeDetails(const PipelineOptions& options, const RunDetails& run)
   SetNonedges(run.tested, index, &details);
   details.discovery = run.discovery;
   SetCutPlaces(&details);
-  const auto strong = static_cast<std::uint32_t>(2 * options.verification.min_num_inliers);
+  const auto strong = static_cast<std::uint32_t>(2 * options.verification.geometry.min_num_inliers);
   details.weak_links = FindWeakLinks(details.images.size(), details.edges, strong, kMinGroup);
   for (const ImageWithoutEdge& image : run.images_without_edge) {
     details.images_without_edge.push_back(WithPlaces(image, index));
@@ -126,7 +126,7 @@ ReportData MakeReportData(const PipelineOptions& options, const PipelineResult& 
   data.num_expected_tests_left = result.num_expected_tests_left;
   data.strategy = NameOfStrategy(options);
   if (options.RanksImages()) data.descriptor = NameOfDescriptor(options.ranking);
-  data.min_num_inliers = options.verification.min_num_inliers;
+  data.min_num_inliers = options.verification.geometry.min_num_inliers;
   data.num_threads = result.num_threads;
   data.peak_memory_mb = PeakMemory();
   data.num_images = result.num_images;

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/messages.h"
-#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/base/verified_pair.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 #include "colmap_graphmatch/vectors/checkpoint.h"

@@ -7,6 +7,7 @@
 #include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/matching/pair_order.h"
 #include "colmap_graphmatch/verification/fault_isolation.h"
+#include "colmap_graphmatch/verification/points.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -43,6 +44,9 @@ std::vector<ShardRunner::Shard> CutIntoShards(std::vector<ImagePair> pairs,
   return shards;
 }
 
+// Whether Write found that another program had verified the pair in the meantime.
+bool IsOfOthers(const VerifiedPair& written) { return written.num_matches < 0; }
+
 }  // namespace
 
 BatchVerifier::BatchVerifier(const VerificationOptions& options, const VerificationPlan& plan,
@@ -55,13 +59,19 @@ BatchVerifier::BatchVerifier(const VerificationOptions& options, const Verificat
       stop_(stop),
       on_warning_(on_warning),
       runner_(static_cast<std::size_t>(plan.num_processes), stop) {
-  for (const ImageRecord& image : images) names_.emplace(image.id, image.name);
-  known_ = database.ReadVerifiedPairs(static_cast<std::size_t>(options.min_num_inliers));
+  for (const ImageRecord& image : images) images_.emplace(image.id, image);
+  known_ = database.ReadVerifiedPairs(static_cast<std::size_t>(options.geometry.min_num_inliers));
   if (!plan.matches_here) return;
-  exact_matcher_ = std::make_unique<ExactMatcher>(options.exact, database.Path(), images,
-                                                  sqlite::LockPatience(options.lock_timeout, &stop),
-                                                  static_cast<std::size_t>(plan.num_processes));
+  exact_matcher_ = std::make_unique<ExactMatcher>(
+      options.exact,
+      geometry.NeedsPoints() ? ExactMatcher::Points::kGiven : ExactMatcher::Points::kLeftOut,
+      database.Path(), images, sqlite::LockPatience(options.lock_timeout, &stop),
+      static_cast<std::size_t>(plan.num_processes));
   unverified_ = database.ReadUnverifiedPairs();
+  if (geometry.NeedsPoints() && !unverified_.empty()) {
+    reader_.emplace(database.Path(), sqlite::Access::kRead,
+                    sqlite::LockPatience(options.lock_timeout, &stop));
+  }
   WarnOfCutFeatures(images);
 }
 
@@ -109,14 +119,14 @@ void BatchVerifier::CheckThatItWorks(const ShardPart& part) {
   }
 }
 
-std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
-                                            ShardRunner::Progress& progress) {
-  std::vector<ShardPair> to_verify;
+std::vector<PairToVerify> BatchVerifier::Match(const ShardRunner::Shard& pairs,
+                                               ShardRunner::Progress& progress) {
+  std::vector<PairToVerify> to_verify;
   std::vector<ImagePair> to_match;
   for (const ImagePair& pair : pairs) {
     const bool has_matches = std::binary_search(unverified_.begin(), unverified_.end(), pair);
     if (exact_matcher_ == nullptr || has_matches) {
-      to_verify.push_back({pair, std::nullopt});
+      to_verify.push_back(reader_ ? ReadPair(pair) : PairToVerify{pair, std::nullopt});
     } else {
       to_match.push_back(pair);
     }
@@ -124,22 +134,21 @@ std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
   if (to_match.empty()) return to_verify;
 
   const double start = ThreadCpuSeconds();
-  std::vector<std::vector<FeatureMatch>> matches;
+  std::vector<MatchedPair> matched;
   const auto should_stop = [&progress] { return progress.GivesUp(); };
-  if (!exact_matcher_->Match(to_match, should_stop, &matches)) return {};
+  if (!exact_matcher_->Match(to_match, should_stop, &matched)) return {};
   ShardPart unmatched;
   unmatched.is_verified = false;
   for (std::size_t i = 0; i < to_match.size(); ++i) {
-    if (matches[i].size() < static_cast<std::size_t>(options_.min_num_inliers)) {
-      PairRows rows;
-      rows.pair = to_match[i];
-      rows.config = geometry_.ConfigOfUnmatched();
-      rows.num_dropped_matches = matches[i].size();
-      unmatched.results.push_back(std::move(rows));
+    if (matched[i].matches.size() < static_cast<std::size_t>(options_.geometry.min_num_inliers)) {
+      PairGeometry result;
+      result.pair = to_match[i];
+      result.num_dropped_matches = matched[i].matches.size();
+      result.geometry.configuration = geometry_.ConfigurationOfUnmatched();
+      unmatched.results.push_back(std::move(result));
     } else {
-      const auto* bytes = reinterpret_cast<const std::uint8_t*>(matches[i].data());
-      to_verify.push_back(
-          {to_match[i], sqlite::Blob(bytes, bytes + matches[i].size() * sizeof(FeatureMatch))});
+      to_verify.push_back({to_match[i], std::move(matched[i].matches), std::move(matched[i].points),
+                           std::move(matched[i].distinctness)});
     }
   }
   {
@@ -151,8 +160,18 @@ std::vector<ShardPair> BatchVerifier::Match(const ShardRunner::Shard& pairs,
   return to_verify;
 }
 
+PairToVerify BatchVerifier::ReadPair(const ImagePair& pair) {
+  const std::lock_guard<std::mutex> lock(reading_);
+  PairToVerify read{pair, reader_->ReadMatches(pair)};
+  const auto positions_of = [this](ImageId image) {
+    return PositionsOf(reader_->ReadKeypoints(images_.at(image)));
+  };
+  read.points = PointsOf(*read.matches, positions_of(pair.id1), positions_of(pair.id2));
+  return read;
+}
+
 void BatchVerifier::Work(const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
-  const std::vector<ShardPair> to_verify = Match(shard, progress);
+  const std::vector<PairToVerify> to_verify = Match(shard, progress);
   const auto size = static_cast<std::size_t>(options_.max_pairs_per_shard);
   for (std::size_t first = 0; first < to_verify.size(); first += size) {
     if (first > 0 && stop_.Requested()) break;
@@ -162,25 +181,26 @@ void BatchVerifier::Work(const ShardRunner::Shard& shard, ShardRunner::Progress&
   }
 }
 
-std::vector<VerifiedPair> BatchVerifier::Write(const std::vector<PairRows>& results) {
+std::vector<VerifiedPair> BatchVerifier::Write(const std::vector<PairGeometry>& results) {
   std::vector<VerifiedPair> written;
   if (results.empty()) return written;
   const std::vector<TestedPair> of_others = database_.WritePairs(results);
   auto other = of_others.begin();
-  for (const PairRows& rows : results) {
+  for (const PairGeometry& result : results) {
     VerifiedPair verified;
-    verified.pair = rows.pair;
-    std::size_t num_inliers = rows.num_inliers;
-    int config = rows.config;
-    if (other != of_others.end() && other->pair == rows.pair) {
+    verified.pair = result.pair;
+    std::size_t num_inliers = result.geometry.inliers.size();
+    int config = static_cast<int>(result.geometry.configuration);
+    if (other != of_others.end() && other->pair == result.pair) {
       num_inliers = other->num_inliers;
       config = other->config;
       ++other;
     } else {
-      verified.num_matches = static_cast<std::int32_t>(rows.num_matches + rows.num_dropped_matches);
+      verified.num_matches =
+          static_cast<std::int32_t>(result.matches.size() + result.num_dropped_matches);
     }
     const bool is_edge =
-        IsEdge(num_inliers, config, static_cast<std::size_t>(options_.min_num_inliers));
+        IsEdge(num_inliers, config, static_cast<std::size_t>(options_.geometry.min_num_inliers));
     verified.outcome = is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge;
     verified.num_inliers = static_cast<std::uint32_t>(num_inliers);
     written.push_back(verified);
@@ -227,13 +247,18 @@ bool BatchVerifier::Verify(const std::vector<ImagePair>& pairs,
           "are given up. The next run verifies these pairs again.");
       throw;
     }
-    for (const VerifiedPair& verified : written) {
+    for (std::size_t i = 0; i < written.size(); ++i) {
       --num_unanswered;
-      on_verified(verified);
+      inliers_of_ = ImagePair();
+      if (!IsOfOthers(written[i])) {
+        inliers_of_ = written[i].pair;
+        inliers_ = part.results[i].geometry.inliers;
+      }
+      on_verified(written[i]);
     }
     for (const auto& [pair, problem] : part.failures) {
-      on_warning_("COLMAP failed on the pair \"" + names_.at(pair.id1) + "\" and \"" +
-                  names_.at(pair.id2) + "\", which stays untested. It " + problem);
+      on_warning_("COLMAP failed on the pair \"" + images_.at(pair.id1).name + "\" and \"" +
+                  images_.at(pair.id2).name + "\", which stays untested. It " + problem);
       --num_unanswered;
       ++num_failed_;
       on_verified({pair, PairOutcome::kFailed, 0});
@@ -246,6 +271,15 @@ bool BatchVerifier::Verify(const std::vector<ImagePair>& pairs,
       },
       merge);
   return num_unanswered == 0;
+}
+
+const FeatureMatches& BatchVerifier::Inliers(const ImagePair& pair) {
+  if (inliers_of_ != pair) {
+    inliers_of_ = ImagePair();
+    inliers_ = database_.ReadInliers(pair);
+    inliers_of_ = pair;
+  }
+  return inliers_;
 }
 
 }  // namespace colmap_graphmatch

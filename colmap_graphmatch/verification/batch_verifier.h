@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -52,6 +53,7 @@ class BatchVerifier : public PairVerifier {
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_; }
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override;
+  const FeatureMatches& Inliers(const ImagePair& pair) override;
 
  private:
   // The shards of what is not known, which is reported.
@@ -61,9 +63,11 @@ class BatchVerifier : public PairVerifier {
   // What a worker does with a shard.
   void Work(const ShardRunner::Shard& shard, ShardRunner::Progress& progress);
   // Matches the pairs here. Those with too few matches are finished; returns the others.
-  std::vector<ShardPair> Match(const ShardRunner::Shard& pairs, ShardRunner::Progress& progress);
+  std::vector<PairToVerify> Match(const ShardRunner::Shard& pairs, ShardRunner::Progress& progress);
+  // With the matches and points that the database has.
+  PairToVerify ReadPair(const ImagePair& pair);
   // Writes results to the database and returns what it has of these pairs from then on.
-  std::vector<VerifiedPair> Write(const std::vector<PairRows>& results);
+  std::vector<VerifiedPair> Write(const std::vector<PairGeometry>& results);
   // Throws ColmapError once verification has failed on pairs that have nothing in common.
   void CheckThatItWorks(const ShardPart& part);
   void WarnOfCutFeatures(const std::vector<ImageRecord>& images) const;
@@ -71,17 +75,22 @@ class BatchVerifier : public PairVerifier {
   VerificationOptions options_;
   GeometryVerifier& geometry_;
   Database& database_;
-  std::map<ImageId, std::string> names_;
   const StopRequest& stop_;
   std::function<void(const std::string&)> on_warning_;
   ShardRunner runner_;
-  std::vector<VerifiedPair> known_;              // Ascending.
+  std::vector<VerifiedPair> known_;  // Ascending.
+  ImagePair inliers_of_;             // The pair that Inliers was asked for last, or that was
+  FeatureMatches inliers_;           // reported last.
   std::unique_ptr<ExactMatcher> exact_matcher_;  // None if COLMAP matches.
   std::vector<ImagePair> unverified_;  // Ascending; their matches are in the database already.
   // Of failures since the last success, no image in two of them.
   std::set<ImageId> failing_images_;
   bool has_verified_ = false;
   std::size_t num_failed_ = 0;
+
+  std::mutex reading_;              // Of the database by workers.
+  std::optional<Database> reader_;  // None if nobody needs points.
+  std::map<ImageId, ImageRecord> images_;
 
   std::mutex mutex_;  // Of what workers add to.
   double matching_seconds_ = 0;

@@ -1,14 +1,15 @@
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
+#include <tuple>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/shard.h"
+#include "colmap_graphmatch/verification/colmap_arguments.h"
 #include "colmap_graphmatch/verification/subprocess.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 
@@ -29,23 +30,6 @@ constexpr char kMatcherType[] = "FeatureMatching.type";
 // undefined.
 constexpr std::pair<int, int> kFirstDegenerate(4, 2);
 
-// COLMAP's options for what differs from its defaults.
-void AddMatchingOptions(const DescriptorMatchingOptions& matching,
-                        std::map<std::string, std::string>* colmap_options) {
-  const DescriptorMatchingOptions defaults;
-  const auto add = [&](const char* name, auto value, auto default_value) {
-    if (value == default_value) return;
-    // The shortest text that stands for the same number.
-    std::array<char, 32> text = {};
-    const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-    (*colmap_options)[name] = std::string(text.data(), end);
-  };
-  add("max_ratio", matching.max_ratio, defaults.max_ratio);
-  add("max_distance", matching.max_distance, defaults.max_distance);
-  add("cross_check", matching.cross_check ? 1 : 0, defaults.cross_check ? 1 : 0);
-  add("max_num_matches", matching.max_num_matches, defaults.max_num_matches);
-}
-
 }  // namespace
 
 ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const VerificationPlan& plan,
@@ -63,22 +47,17 @@ ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const Verific
       stop_(stop) {
   for (const ImageRecord& image : images) num_features_.emplace(image.id, image.num_features);
   // Guided matching is COLMAP's: it matches once more where the geometry says so.
-  const std::string* guided = FindOption(options.colmap_options, "guided_matching");
-  const bool is_guided = guided != nullptr && *guided != "0";
-  shards_have_descriptors_ = !plan_.matches_here || is_guided;
+  shards_have_descriptors_ =
+      !plan_.matches_here || options.geometry.guided_matching.value_or(false);
   arguments_ = FindArguments(on_warning);
+  arguments_for_few_trials_ = ArgumentsForFewTrials();
   MakeTemplate();
 }
 
 std::vector<std::string> ColmapVerifier::FindArguments(
     const std::function<void(const std::string&)>& on_warning) const {
-  std::map<std::string, std::string> colmap_options = options_.colmap_options;
-  AddMatchingOptions(options_.exact.matching, &colmap_options);
-  colmap_options["use_gpu"] = plan_.uses_gpu ? "1" : "0";
-  colmap_options["num_threads"] = std::to_string(plan_.threads_per_process);
-  colmap_options["min_num_inliers"] = std::to_string(options_.min_num_inliers);
   std::vector<std::string> unknown;
-  std::vector<std::string> arguments = colmap_.Arguments(colmap_options, &unknown);
+  std::vector<std::string> arguments = colmap_.Arguments(ColmapOptions(options_, plan_), &unknown);
   if (std::find(unknown.begin(), unknown.end(), kMatcherType) != unknown.end()) {
     throw OptionsError("COLMAP " + colmap_.Version() + " does not have --" + kMatcherType + " " +
                        options_.colmap_options.at(kMatcherType) +
@@ -92,6 +71,22 @@ std::vector<std::string> ColmapVerifier::FindArguments(
                " does not have these options, which have no effect: " + names + ".");
   }
   return arguments;
+}
+
+std::vector<std::string> ColmapVerifier::ArgumentsForFewTrials() const {
+  // COLMAP's least number of trials, to which it raises all others.
+  constexpr int kFewTrials = 100;
+  // Seven of seven matches are inliers in every fifth trial then.
+  constexpr double kInlierRatio = 0.8;
+  VerificationOptions options = options_;
+  GeometryOptions& geometry = options.geometry;
+  geometry.max_num_trials = std::min(kFewTrials, geometry.max_num_trials.value_or(kFewTrials));
+  // Later versions reject pairs with a smaller share.
+  const bool is_budget =
+      std::make_tuple(colmap_.major, colmap_.minor, colmap_.patch) <= std::make_tuple(4, 2, 1);
+  if (is_budget) geometry.min_inlier_ratio = kInlierRatio;
+  std::vector<std::string> unknown;  // They were warned of.
+  return colmap_.Arguments(ColmapOptions(options, plan_), &unknown);
 }
 
 void ColmapVerifier::MakeTemplate() const {
@@ -109,9 +104,10 @@ void ColmapVerifier::MakeTemplate() const {
                     "This COLMAP does not work; name another with --colmap_path.");
 }
 
-int ColmapVerifier::ConfigOfUnmatched() const {
-  // TwoViewGeometry::ConfigurationType: undefined, or degenerate.
-  return std::make_pair(colmap_.major, colmap_.minor) < kFirstDegenerate ? 0 : 1;
+TwoViewConfiguration ColmapVerifier::ConfigurationOfUnmatched() const {
+  return std::make_pair(colmap_.major, colmap_.minor) < kFirstDegenerate
+             ? TwoViewConfiguration::kUndefined
+             : TwoViewConfiguration::kDegenerate;
 }
 
 std::string ColmapVerifier::AdviceOnFailure() const {
@@ -134,22 +130,27 @@ double ColmapVerifier::Timeout(std::size_t num_pairs) const {
 }
 
 std::map<ImageId, std::size_t> ColmapVerifier::NumFeatures(
-    const std::vector<ShardPair>& pairs) const {
+    const std::vector<PairToVerify>& pairs) const {
   std::map<ImageId, std::size_t> num_features;
-  for (const auto& [pair, matches] : pairs) {
-    num_features[pair.id1] = num_features_.at(pair.id1);
-    num_features[pair.id2] = num_features_.at(pair.id2);
+  for (const PairToVerify& asked : pairs) {
+    for (const ImageId id : {asked.pair.id1, asked.pair.id2}) {
+      num_features[id] = num_features_.at(id);
+    }
   }
   return num_features;
 }
 
 std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& directory,
-                                                   const std::vector<ShardPair>& pairs) const {
+                                                   const std::vector<PairToVerify>& pairs,
+                                                   Trials trials) const {
   const std::filesystem::path shard_path = directory / "database.db";
   const std::filesystem::path list_path = directory / "pairs.txt";
   try {
     std::filesystem::copy_file(template_path_, shard_path);
-    FillShard(shard_path, database_path_, {options_.lock_timeout, &stop_}, pairs,
+    std::vector<ShardPair> rows;
+    rows.reserve(pairs.size());
+    for (const PairToVerify& pair : pairs) rows.push_back({pair.pair, pair.matches});
+    FillShard(shard_path, database_path_, {options_.lock_timeout, &stop_}, rows,
               shards_have_descriptors_);
   } catch (const std::filesystem::filesystem_error& error) {
     ThrowIfUnusable(work_path_);
@@ -160,8 +161,8 @@ std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& 
     throw;
   }
   std::ofstream list(list_path);
-  for (const auto& [pair, matches] : pairs) {
-    list << ShardImageName(pair.id1) << ' ' << ShardImageName(pair.id2) << '\n';
+  for (const PairToVerify& asked : pairs) {
+    list << ShardImageName(asked.pair.id1) << ' ' << ShardImageName(asked.pair.id2) << '\n';
   }
   list.close();
   if (!list) ThrowIfUnusable(work_path_);
@@ -170,16 +171,18 @@ std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& 
   std::vector<std::string> command = {
       colmap_.executable.string(), "matches_importer", "--database_path", shard_path.string(),
       "--match_list_path",         list_path.string(), "--match_type",    "pairs"};
-  command.insert(command.end(), arguments_.begin(), arguments_.end());
+  const std::vector<std::string>& arguments =
+      trials == Trials::kFew ? arguments_for_few_trials_ : arguments_;
+  command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }
 
-ShardOutcome ColmapVerifier::Verify(const std::vector<ShardPair>& pairs,
+ShardOutcome ColmapVerifier::Verify(const std::vector<PairToVerify>& pairs, Trials trials,
                                     const std::function<bool()>& should_stop) {
   const WorkDirectory directory(work_path_);
   const std::filesystem::path output_path = directory.Path() / "output.txt";
-  const SubprocessResult run = RunSubprocess(MakeShard(directory.Path(), pairs), output_path,
-                                             Timeout(pairs.size()), should_stop);
+  const SubprocessResult run = RunSubprocess(MakeShard(directory.Path(), pairs, trials),
+                                             output_path, Timeout(pairs.size()), should_stop);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     statistics_.seconds += run.seconds;
@@ -199,7 +202,9 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<ShardPair>& pairs,
     outcome.problem = run.Describe() + ":\n" + last_lines;
   } else {
     try {
-      outcome.results = ReadShard(directory.Path() / "database.db", pairs, NumFeatures(pairs));
+      std::vector<ImagePair> asked;
+      for (const PairToVerify& pair : pairs) asked.push_back(pair.pair);
+      outcome.results = ReadShard(directory.Path() / "database.db", asked, NumFeatures(pairs));
     } catch (const DatabaseError& error) {
       outcome.problem = std::string("ended without an error, but: ") + error.what() + "\n" +
                         LastLines(output_path, kNumLastLines);

@@ -35,9 +35,16 @@ class ColmapVerifier : public GeometryVerifier {
                  const StopRequest& stop,
                  const std::function<void(const std::string&)>& on_warning);
 
-  ShardOutcome Verify(const std::vector<ShardPair>& pairs,
-                      const std::function<bool()>& should_stop) override;
-  int ConfigOfUnmatched() const override;
+  ShardOutcome Verify(const std::vector<PairToVerify>& pairs,
+                      const std::function<bool()>& should_stop) override {
+    return Verify(pairs, Trials::kAsAsked, should_stop);
+  }
+
+  // kFew: as many trials as matches take of which most are inliers.
+  enum class Trials { kAsAsked, kFew };
+  ShardOutcome Verify(const std::vector<PairToVerify>& pairs, Trials trials,
+                      const std::function<bool()>& should_stop);
+  TwoViewConfiguration ConfigurationOfUnmatched() const override;
   std::string AdviceOnFailure() const override;
 
   // Of all calls of Verify so far.
@@ -46,12 +53,13 @@ class ColmapVerifier : public GeometryVerifier {
  private:
   std::vector<std::string> FindArguments(
       const std::function<void(const std::string&)>& on_warning) const;
+  std::vector<std::string> ArgumentsForFewTrials() const;
   void MakeTemplate() const;
   // In the directory of the shard; the command that verifies it.
   std::vector<std::string> MakeShard(const std::filesystem::path& directory,
-                                     const std::vector<ShardPair>& pairs) const;
+                                     const std::vector<PairToVerify>& pairs, Trials trials) const;
   double Timeout(std::size_t num_pairs) const;
-  std::map<ImageId, std::size_t> NumFeatures(const std::vector<ShardPair>& pairs) const;
+  std::map<ImageId, std::size_t> NumFeatures(const std::vector<PairToVerify>& pairs) const;
 
   VerificationOptions options_;
   VerificationPlan plan_;
@@ -63,6 +71,7 @@ class ColmapVerifier : public GeometryVerifier {
   const StopRequest& stop_;
   bool shards_have_descriptors_ = true;
   std::vector<std::string> arguments_;  // Of every run of matches_importer.
+  std::vector<std::string> arguments_for_few_trials_;
 
   mutable std::mutex mutex_;  // Of what follows.
   Statistics statistics_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/verification/points.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -43,24 +44,29 @@ void ExactMatcherOptions::Check() const {
   }
 }
 
-ExactMatcher::ExactMatcher(const ExactMatcherOptions& options,
+ExactMatcher::ExactMatcher(const ExactMatcherOptions& options, Points points,
                            const std::filesystem::path& database_path,
                            const std::vector<ImageRecord>& images,
                            const sqlite::LockPatience& patience, std::size_t num_threads)
     : options_(options),
+      points_(points),
       images_(ById(images)),
       cache_(CacheBytes(options.cache_gb), NumReaders(num_threads),
              [this, database_path, patience]() -> DescriptorCache::Reader {
                const auto database =
                    std::make_shared<Database>(database_path, sqlite::Access::kRead, patience);
                return [this, database](ImageId image) {
-                 return MatchingFeatures{database->ReadDescriptors(images_.at(image)).data};
+                 MatchingFeatures features{database->ReadDescriptors(images_.at(image)).data};
+                 if (points_ == Points::kGiven) {
+                   features.positions = PositionsOf(database->ReadKeypoints(images_.at(image)));
+                 }
+                 return features;
                };
              }) {}
 
 bool ExactMatcher::Match(const std::vector<ImagePair>& pairs,
                          const std::function<bool()>& should_stop,
-                         std::vector<std::vector<FeatureMatch>>* matches) {
+                         std::vector<MatchedPair>* matched) {
   DescriptorMatcher matcher(options_.matching);
   std::deque<std::pair<DescriptorCache::Handle, DescriptorCache::Handle>> requested;
   std::size_t next = 0;
@@ -74,7 +80,13 @@ bool ExactMatcher::Match(const std::vector<ImagePair>& pairs,
     const MatchingFeatures& features1 = cache_.Wait(handle1);
     const MatchingFeatures& features2 = cache_.Wait(handle2);
     ++num_pairs_;
-    matches->push_back(matcher.Match(features1.View(), features2.View()));
+    MatchedPair& pair = matched->emplace_back();
+    if (points_ == Points::kLeftOut) {
+      pair.matches = matcher.Match(features1.View(), features2.View());
+    } else {
+      pair.matches = matcher.Match(features1.View(), features2.View(), &pair.distinctness);
+      pair.points = PointsOf(pair.matches, features1.positions, features2.positions);
+    }
   }
   return true;
 }

@@ -12,7 +12,7 @@ constexpr int kTries = 2;
 
 }  // namespace
 
-void VerifyAndIsolate(GeometryVerifier& verifier, const std::vector<ShardPair>& pairs,
+void VerifyAndIsolate(GeometryVerifier& verifier, const std::vector<PairToVerify>& pairs,
                       ShardRunner::Progress& progress) {
   std::string problem;
   for (int i = 0; i < kTries; ++i) {

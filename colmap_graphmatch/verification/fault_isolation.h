@@ -11,7 +11,7 @@ namespace colmap_graphmatch {
 // their fault (memory, a signal); then halves them until the pair that is to blame is alone: that
 // one is a failure, and all others have results. Hands everything to `progress` as it is finished,
 // and stops when that gives up.
-void VerifyAndIsolate(GeometryVerifier& verifier, const std::vector<ShardPair>& pairs,
+void VerifyAndIsolate(GeometryVerifier& verifier, const std::vector<PairToVerify>& pairs,
                       ShardRunner::Progress& progress);
 
 }  // namespace colmap_graphmatch

@@ -5,6 +5,7 @@
 
 #include "colmap_graphmatch/base/enum_words.h"
 #include "colmap_graphmatch/matching/options.h"
+#include "colmap_graphmatch/verification/geometry_options.h"
 
 namespace colmap_graphmatch {
 
@@ -28,6 +29,12 @@ struct VerificationOptions {
   enum class Matcher { kAuto, kExact, kColmap };
   Matcher matcher = Matcher::kAuto;
 
+  // Who decides whether a pair is an edge. kColmap: COLMAP alone. kScreened: the same, but a fast
+  // fit goes first (screened_verifier.h). kNative: this library (native_verifier.h). Where COLMAP
+  // matches, it also verifies.
+  enum class Verifier { kScreened, kColmap, kNative };
+  Verifier verifier = Verifier::kColmap;
+
   ExactMatcherOptions exact;
 
   // COLMAP processes at a time, which share the run's threads. 0: one of one thread each without a
@@ -38,13 +45,11 @@ struct VerificationOptions {
   // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
   bool use_gpu = true;
 
-  // A pair is an edge with this many inliers, 0 being as good as 1. Also handed to COLMAP.
-  int min_num_inliers = 15;
+  GeometryOptions geometry;
 
-  // Other options of COLMAP's feature matching and geometric verification, by their names in any
-  // version (e.g. "SiftMatching.max_error") or without a group, as COLMAP is to get them. What is
-  // not here keeps COLMAP's own default. Those of exact.matching do not belong here: COLMAP gets
-  // them from there.
+  // Other options of COLMAP's, by their names in any version (e.g. "SiftMatching.gpu_index") or
+  // without a group, as COLMAP is to get them. What is not here keeps COLMAP's own default. Those
+  // of exact.matching and geometry do not belong here: COLMAP gets them from there.
   std::map<std::string, std::string> colmap_options;
 
   // Pairs a shard at most, the amount of work that a crash of COLMAP or kill -9 can lose.
@@ -67,15 +72,17 @@ inline constexpr EnumWords<VerificationOptions::Matcher, 3> kMatcherWords = {
      {VerificationOptions::Matcher::kExact, "exact"},
      {VerificationOptions::Matcher::kColmap, "colmap"}}};
 
-// The value of an option in colmap_options, in whatever group it was given, or null.
-const std::string* FindOption(const std::map<std::string, std::string>& options,
-                              const std::string& name);
+inline constexpr EnumWords<VerificationOptions::Verifier, 3> kVerifierWords = {
+    {{VerificationOptions::Verifier::kScreened, "screened"},
+     {VerificationOptions::Verifier::kColmap, "colmap"},
+     {VerificationOptions::Verifier::kNative, "native"}}};
 
 // What the options come to with the COLMAP that is installed.
 struct VerificationPlan {
   bool matches_here = true;  // Descriptors, by this library.
   bool uses_gpu = false;     // COLMAP does.
-  int num_processes = 1;     // Of COLMAP, at a time,
+  VerificationOptions::Verifier verifier = VerificationOptions::Verifier::kColmap;
+  int num_processes = 1;  // Of COLMAP, at a time,
   int threads_per_process = 1;
 };
 

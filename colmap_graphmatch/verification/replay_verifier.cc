@@ -64,4 +64,10 @@ bool ReplayVerifier::Verify(const std::vector<ImagePair>& pairs,
   return true;
 }
 
+const FeatureMatches& ReplayVerifier::Inliers(const ImagePair& pair) {
+  inliers_.clear();
+  if (read_inliers_) inliers_ = read_inliers_(pair);
+  return inliers_;
+}
+
 }  // namespace colmap_graphmatch

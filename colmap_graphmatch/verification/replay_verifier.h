@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/pair_verifier.h"
@@ -36,6 +37,11 @@ class ReplayVerifier : public PairVerifier {
   // Without this, tests take no time.
   void SetCosts(std::unordered_map<ImageId, std::size_t> num_features, int num_threads);
 
+  // Reads the inlier matches of a pair. Without this there are none.
+  void SetInliers(std::function<FeatureMatches(const ImagePair&)> read_inliers) {
+    read_inliers_ = std::move(read_inliers);
+  }
+
   // Answers no more when this asks for it.
   void SetStop(const StopRequest* stop) { stop_ = stop; }
 
@@ -46,6 +52,7 @@ class ReplayVerifier : public PairVerifier {
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_pairs_; }
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override;
+  const FeatureMatches& Inliers(const ImagePair& pair) override;
 
  private:
   VerifiedPair Answer(const ImagePair& pair) const;
@@ -55,6 +62,8 @@ class ReplayVerifier : public PairVerifier {
   std::vector<VerifiedPair> known_pairs_;
   std::unordered_map<ImageId, std::size_t> num_features_;
   int num_threads_ = 1;
+  std::function<FeatureMatches(const ImagePair&)> read_inliers_;
+  FeatureMatches inliers_;  // Read last.
   const StopRequest* stop_ = nullptr;
   double modelled_seconds_ = 0;
 };

@@ -20,7 +20,7 @@ struct ShardRunner::Batch : public ShardRunner::Progress {
 
   void Finish(ShardPart part) override {
     const std::lock_guard<std::mutex> lock(mutex);
-    for (const PairRows& rows : part.results) answered.insert(rows.pair);
+    for (const PairGeometry& result : part.results) answered.insert(result.pair);
     for (const ShardPart::Failure& failure : part.failures) answered.insert(failure.first);
     finished.push_back(std::move(part));
     changed.notify_all();

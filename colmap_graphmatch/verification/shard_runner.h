@@ -17,7 +17,7 @@ namespace colmap_graphmatch {
 struct ShardPart {
   using Failure = std::pair<ImagePair, std::string>;  // What went wrong with the pair.
 
-  std::vector<PairRows> results;
+  std::vector<PairGeometry> results;
   std::vector<Failure> failures;
   bool is_verified = true;  // By a GeometryVerifier; else its pairs have too few matches.
 };

@@ -88,8 +88,14 @@ message() {
   text=${text//|/\\|}
   sed -E -e 's/graphmatch-[a-z0-9]{16}/graphmatch-XXXXXX/g' -e 's/held by process [0-9]+/held by process PID/' \
     -e 's/a made-up fault on the pair [0-9]+ [0-9]+/WHAT COLMAP PRINTED/' -e 's/x{300} \.\.\./WHAT COLMAP PRINTED/' \
-    -e 's/images [0-9]+ and [0-9]+/images ID and ID/' -e 's/within [0-9]\.[0-9] s/within 0.2 s/' \
-    -e 's/within 60\.[0-9] s/within 60.0 s/' -e 's/ +$//' <<<"${text:--}"
+    -e 's/images [0-9]+ and [0-9]+/images ID and ID/' -e 's/Image "[^"]*" \(id [0-9]+\)/Image NAME (id ID)/' \
+    -e 's/within [0-9]\.[0-9] s/within 0.2 s/' \
+    -e 's/within 60\.[0-9] s/within 60.0 s/' -e 's#/home/you/programs/[a-z-]+#PROGRAM#g' \
+    -e 's#(^|`)/bin/(true|false)\b#\1PROGRAM#' -e 's#/home/you/none/[a-z]+\.[a-z]+#FILE#g' \
+    -e 's#(working directory in) /home/you/[a-z/]+:#\1 DIRECTORY:#' \
+    -e 's#(list of [a-z ]+) /(home/you|dev)/[a-z./]+:#\1 FILE:#' \
+    -e 's/: ((No such|Is a|Not a|Permission|Exec|Read-only) [a-z ]+|it is a device, not a regular file)\./: REASON./' \
+    -e 's/ +$//' <<<"${text:--}"
 }
 
 theme() {
@@ -98,10 +104,16 @@ theme() {
   echo "== $1"
 }
 
-# skip WHAT WHY: the row of the document stays as it is.
+# skip WHAT WHY: what the document says of it stays as it is.
 skip() {
   echo "SKIPPED: $1 ($2)"
-  grep -F -- "| $1 |" "$document" >>"$table" || echo "(docs/errors.md has no row for it)"
+  awk -F ' [|] ' -v what="$1" '
+    /^No message, exit code 0:/ { if (index($0 ";", " " what ";") || index($0, " " what ".")) print what "\t0\t-" }
+    { cases = substr($1, 3) }
+    /^[|]/ && index("<br>" cases "<br>", "<br>" what "<br>") { sub(/ [|]$/, "", $3); print what "\t" $2 "\t" $3 }
+  ' "$document" >"$work/skipped.txt"
+  [[ -s $work/skipped.txt ]] || echo "(docs/errors.md does not name it)"
+  cat "$work/skipped.txt" >>"$table"
   num_skipped=$((num_skipped + 1))
 }
 num_skipped=0
@@ -117,11 +129,12 @@ expect_no_processes() {
   fail "$1: a COLMAP was left running"
 }
 
-# says CODE WHAT HOW_TO_GO_ON COMMAND...: runs it as the case WHAT and records a row. Variables: piece, to record
-# only that part of the message; partial=yes if pairs that were finished may be kept in spite of the error.
+# says CODE WHAT COMMAND...: runs it as the case WHAT and records what it says. Variables: piece, to record only that
+# part of the message; advice, what to do where the message does not say it; partial=yes if pairs that were finished may
+# be kept in spite of the error.
 says() {
-  local expected=$1 what=$2 go_on=$3 code=0 text
-  shift 3
+  local expected=$1 what=$2 code=0 text
+  shift 2
   snapshot before
   timeout 300 "$@" >"$work/output.txt" 2>&1 </dev/null || code=$?
   snapshot after
@@ -142,7 +155,7 @@ says() {
   fi
   ((code == 0)) || [[ $text != - ]] || fail "$what: exit code $code without a message"
   ((${#text} < 1000)) || fail "$what: the message has ${#text} letters"
-  echo "| $what | $code | $text | $go_on |" >>"$table"
+  printf '%s\t%s\t%s\n' "$what" "$code" "${text//$'\t'/ }${advice:+ ($advice)}" >>"$table"
   num_cases=$((num_cases + 1))
 }
 
@@ -160,43 +173,42 @@ for master in small big; do
 done
 
 theme databases
-same='give the path of the right file'
-again='extract the features again'
 fresh
-says 2 'There is no file' "$same" "$matcher" --database_path "$place/none.db" --colmap_path "$fake"
+says 2 'There is no file' "$matcher" --database_path "$place/none.db" --colmap_path "$fake"
 fresh
 rm "$database"
 mkdir "$database"
-says 2 'It is a directory' "$same" "${run[@]}"
+says 2 'It is a directory' "${run[@]}"
 fresh
 : >"$database"
-says 2 'The file is empty' 'extract features into it' "${run[@]}"
+says 2 'The file is empty' "${run[@]}"
 echo 'not a database, but long enough to be looked at as one' >"$database"
-says 2 'It is not a SQLite file' "$same" "${run[@]}"
+says 2 'It is not a SQLite file' "${run[@]}"
 fresh
 rm "$database"
 change 'CREATE TABLE tracks(title TEXT); INSERT INTO tracks VALUES(1)'
-says 2 'A SQLite file of another program' "$same" "${run[@]}"
+says 2 'A SQLite file of another program' "${run[@]}"
 fresh
 change 'DROP TABLE two_view_geometries'
-says 2 'A table is missing' "$same" "${run[@]}"
+says 2 'A table is missing' "${run[@]}"
 fresh
 change 'ALTER TABLE two_view_geometries DROP COLUMN F'
-says 2 'A column is missing: a COLMAP long before 3.8' 'extract the features again, with a newer COLMAP' "${run[@]}"
+advice='extract the features again, with a newer COLMAP' \
+  says 2 'A column is missing: a COLMAP long before 3.8' "${run[@]}"
 fresh
 change 'ALTER TABLE two_view_geometries DROP COLUMN qvec; ALTER TABLE two_view_geometries DROP COLUMN tvec'
-says 0 'Only the columns `qvec` and `tvec` are missing: a COLMAP shortly before 3.8' 'nothing to do' "${run[@]}"
+says 0 'Only the columns `qvec` and `tvec` are missing: a COLMAP shortly before 3.8' "${run[@]}"
 [[ $(wc -l <"$work/pairs.after") == $(wc -l <"$work/small.pairs") ]] || fail 'pairs are missing'
 fresh
 truncate -s 70000 "$database"
 piece='database disk image is malformed. The file is damaged: `sqlite3 FILE .recover` may save its contents.' \
-  says 2 'The file is cut off, e.g. an incomplete copy' 'copy it again' "${run[@]}"
+  advice='copy it again' says 2 'The file is cut off, e.g. an incomplete copy' "${run[@]}"
 fresh
 # The first byte of a page says what it is; 255 is nothing.
 page=$(sqlite3 "$database" "SELECT rootpage FROM sqlite_schema WHERE name = 'descriptors'")
 printf '\xff' | dd of="$database" bs=1 seek=$(((page - 1) * 4096)) conv=notrunc status=none
 piece='database disk image is malformed. The file is damaged: `sqlite3 FILE .recover` may save its contents.' \
-  says 2 'The file is damaged inside' 'take a copy of before, or try `.recover`' "${run[@]}"
+  says 2 'The file is damaged inside' "${run[@]}"
 fresh
 "${run[@]}" --GraphMatching.max_pairs 40 >"$work/output.txt" 2>&1
 change 'PRAGMA journal_mode = DELETE'
@@ -207,43 +219,43 @@ while [[ $(dd if="$database" bs=1 skip=$(((page - 1) * 4096)) count=1 status=non
 done
 printf '\x0f\xf0' | dd of="$database" bs=1 seek=$(((page - 1) * 4096 + 5)) conv=notrunc status=none
 piece='and to write to it could destroy more. Nothing was written: `sqlite3 FILE .recover` may save its contents.' \
-  says 2 'A table to write to is damaged in a way that reading does not notice' \
-  'take a copy of before, or try `.recover`' "${run[@]}"
+  says 2 'A table to write to is damaged in a way that reading does not notice' "${run[@]}"
 fresh
 rm "$database"
 mkfifo "$database"
-says 2 'It is a pipe, or another file that is none' "$same" "${run[@]}"
+says 2 'It is a pipe, or another file that is none' "${run[@]}"
 fresh
 change 'DELETE FROM images; DELETE FROM keypoints; DELETE FROM descriptors'
-says 2 'It has no images' 'extract features into it' "${run[@]}"
+says 2 'It has no images' "${run[@]}"
 fresh
 change 'DELETE FROM keypoints; DELETE FROM descriptors'
-says 2 'No image has features' 'extract features into it' "${run[@]}"
+says 2 'No image has features' "${run[@]}"
 fresh
 change 'DELETE FROM images WHERE image_id > 1; DELETE FROM descriptors WHERE image_id > 1'
-says 0 'It has one image' 'add images' "${run[@]}"
+says 0 'It has one image' "${run[@]}"
 fresh
 change 'DELETE FROM images WHERE image_id > 2; DELETE FROM descriptors WHERE image_id > 1'
-says 0 'It has two images, one of them without features' 'add images' "${run[@]}"
+says 0 'It has two images, one of them without features' "${run[@]}"
 fresh
 change 'DELETE FROM descriptors WHERE image_id = 3'
-says 0 'An image has no features' 'nothing to do: the others are matched' "${run[@]}"
+says 0 'An image has no features' "${run[@]}"
 fresh
 change 'UPDATE descriptors SET data = zeroblob(60 * 512)'
-says 2 'Descriptors are floating-point numbers (ALIKED)' 'extract SIFT features into a new database' "${run[@]}"
+advice='extract SIFT features into a new database' says 2 'Descriptors are floating-point numbers (ALIKED)' "${run[@]}"
 fresh
 change 'ALTER TABLE descriptors ADD COLUMN type INTEGER NOT NULL DEFAULT 0;
         UPDATE descriptors SET type = 1 WHERE image_id = 3'
-says 2 'Some images have SIFT features, one has others' "$again" "${run[@]}"
+advice='extract SIFT features into a new database' \
+  says 2 'Some images have SIFT features, one has others' "${run[@]}"
 fresh
 change 'UPDATE descriptors SET data = zeroblob(777) WHERE image_id = 3'
-says 2 'Descriptors of the wrong size' "$again" "${run[@]}"
+says 2 'Descriptors of the wrong size' "${run[@]}"
 fresh
 change 'UPDATE descriptors SET cols = 64 WHERE image_id = 3'
-says 2 'Descriptors that are not SIFT' "$again" "${run[@]}"
+says 2 'Descriptors that are not SIFT' "${run[@]}"
 fresh
 change 'UPDATE keypoints SET rows = 59, data = zeroblob(59 * 16) WHERE image_id = 3'
-says 2 'More descriptors than keypoints' "$again" "${run[@]}"
+says 2 'More descriptors than keypoints' "${run[@]}"
 fresh
 # In the groups of ten in which the test double finds edges, as 1 to 12 are.
 for table_of_ids in images keypoints descriptors; do
@@ -251,7 +263,7 @@ for table_of_ids in images keypoints descriptors; do
           UPDATE $table_of_ids SET image_id = 2147483630 + image_id + 4 * (image_id = 12)"
 done
 [[ $(sqlite3 "$database" 'SELECT max(image_id) FROM images') == 2147483646 ]] || fail 'not the greatest id'
-says 0 'The greatest ids that COLMAP allows (2147483646)' 'nothing to do' \
+says 0 'The greatest ids that COLMAP allows (2147483646)' \
   "${run[@]}" --GraphMatching.strategy exhaustive
 results='SELECT rows, quote(data), config FROM two_view_geometries ORDER BY pair_id'
 [[ $(sqlite3 "$database" "$results") == $({
@@ -261,13 +273,12 @@ results='SELECT rows, quote(data), config FROM two_view_geometries ORDER BY pair
 }) ]] || fail 'the greatest ids have other results'
 fresh
 change 'PRAGMA ignore_check_constraints = ON; UPDATE images SET image_id = 2147483647 WHERE image_id = 3'
-says 2 'An id outside the range of COLMAP' "$again" "${run[@]}"
+says 2 'An id outside the range of COLMAP' "${run[@]}"
 
 theme names
-nothing='nothing to do'
 # works WHAT: as if it had a plain name.
 works() {
-  says 0 "$1" "$nothing" "${run[@]}"
+  says 0 "$1" "${run[@]}"
   expect_results small
 }
 fresh small ' two  words '
@@ -302,7 +313,7 @@ works 'Image names that are not UTF-8'
 fresh
 strange=$work/$'a %s "work" \'directory\'\n$(touch bad)'
 mkdir "$strange"
-says 0 'A directory for temporary files with any of this' "$nothing" "${run[@]}" --GraphMatching.work_path "$strange"
+says 0 'A directory for temporary files with any of this' "${run[@]}" --GraphMatching.work_path "$strange"
 expect_results small
 [[ -z $(ls -A "$strange") ]] || fail 'the work directory is not empty'
 
@@ -329,22 +340,21 @@ let_go() {
   wait
   rm "$work/held.txt"
 }
-close='close that program; the same command goes on'
 fresh
 hold 'BEGIN IMMEDIATE;'
-says 3 'Another program writes to the database for longer than `lock_timeout`' "$close" \
+says 3 'Another program writes to the database for longer than `lock_timeout`' \
   "${run[@]}" --GraphMatching.lock_timeout 0.2
 let_go
 fresh
 hold 'PRAGMA locking_mode = EXCLUSIVE; BEGIN IMMEDIATE;'
 piece='another process kept it locked for 0.2 s (held by process PID (sqlite3)). Close that program' \
-  says 3 'Another program has the database for itself' "$close" "${run[@]}" --GraphMatching.lock_timeout 0.2
+  says 3 'Another program has the database for itself' "${run[@]}" --GraphMatching.lock_timeout 0.2
 let_go
 fresh
 change 'PRAGMA journal_mode = DELETE'
 hold 'BEGIN EXCLUSIVE;'
 piece='another process kept it locked for 0.2 s (held by process PID (sqlite3)). Close that program' \
-  says 3 'The same, and the database is not in write-ahead mode' "$close" \
+  says 3 'The same, and the database is not in write-ahead mode' \
   "${run[@]}" --GraphMatching.lock_timeout 0.2
 let_go
 fresh
@@ -367,47 +377,45 @@ for _ in {1..200}; do
   sleep 0.05
 done
 piece='Another graphmatch_matcher works on this database: it holds DATABASE.graphmatch (held by process PID' \
-  says 3 'A second graphmatch_matcher works on the same database' 'let it finish; the same command goes on' \
+  says 3 'A second graphmatch_matcher works on the same database' \
   "${run[@]}" --GraphMatching.lock_timeout 0.2
 kill -KILL "$first"
 wait "$first" 2>/dev/null || true
 works 'A second graphmatch_matcher was killed with -9'
 
 theme rights
-copy='get the right to write, or copy the database elsewhere'
-# bound_says CODE WHAT HOW_TO_GO_ON COMMAND...: says, with permissions that bind.
+# bound_says CODE WHAT COMMAND...: says, with permissions that bind.
 bound_says() {
   if [[ $permissions_bind == no ]]; then
     skip "$2" 'permissions do not bind here'
     return
   fi
-  says "$1" "$2" "$3" "${bound[@]}" "${@:4}"
+  says "$1" "$2" "${bound[@]}" "${@:3}"
 }
 fresh
 chmod 444 "$database"
-bound_says 2 'You may not write to the database' "$copy" "${run[@]}"
+bound_says 2 'You may not write to the database' "${run[@]}"
 fresh
 chmod 000 "$database"
-bound_says 2 'You may not read the database' "$copy" "${run[@]}"
+bound_says 2 'You may not read the database' "${run[@]}"
 chmod 644 "$database"
 fresh
 chmod 555 "$place"
 piece='attempt to write a readonly database. SQLite needs to write to the file and to its directory' \
-  bound_says 2 'You may not write to its directory' "$copy" "${run[@]}"
+  bound_says 2 'You may not write to its directory' "${run[@]}"
 chmod 755 "$place"
 fresh
 chmod 000 "$place"
-bound_says 2 'You may not enter its directory' "$copy" "${run[@]}"
+bound_says 2 'You may not enter its directory' "${run[@]}"
 chmod 755 "$place"
 fresh
 mkdir "$place/temporary"
 chmod 555 "$place/temporary"
-TMPDIR=$place/temporary bound_says 5 'You may not write to `$TMPDIR`' 'name another directory' "${run[@]}"
-bound_says 5 'You may not write to `work_path`' 'name another directory' "${run[@]}" \
+TMPDIR=$place/temporary bound_says 5 'You may not write to `$TMPDIR`' "${run[@]}"
+bound_says 5 'You may not write to `work_path`' "${run[@]}" \
   --GraphMatching.work_path "$place/temporary"
 
 theme disks
-freed='free some space; the same command goes on'
 # mounted OPTIONS: an empty disk; a case that needs one is skipped where nothing can be mounted.
 mounted() { mount -t tmpfs -o "$1" none "$disk"; }
 # With a source, mount takes no options from /proc/self/mountinfo, some of which a user's namespace does not allow.
@@ -436,7 +444,7 @@ else
   mounted size=8m
   on_disk
   remounted ro
-  says 2 "$readonly_disk" "$copy" "${run[@]}"
+  says 2 "$readonly_disk" "${run[@]}"
   umount "$disk"
 
   fresh
@@ -444,7 +452,7 @@ else
   on_disk
   fill
   piece='the disk is full. Nothing half-written was kept; free some space and run the same command again to go on.' \
-    says 2 "$full_disk" "$freed" "${run[@]}"
+    says 2 "$full_disk" "${run[@]}"
   rm "$disk/filling"
   expect_exit 0 'Pairs tested' "${run[@]}"
   snapshot after
@@ -457,7 +465,7 @@ else
   on_disk
   run+=(--GraphMatching.max_pairs_per_shard 4 --SiftMatching.num_threads 1)
   piece='the disk is full. Nothing half-written was kept; free some space and run the same command again to go on.' \
-    partial=yes says 2 "$filling_disk" "$freed" "${run[@]}"
+    partial=yes says 2 "$filling_disk" "${run[@]}"
   kept=$(wc -l <"$work/pairs.after")
   ((kept > 0 && kept < $(wc -l <"$work/big.pairs"))) || fail "$kept rows were kept"
   remounted size=16m
@@ -468,16 +476,16 @@ else
 
   fresh
   mounted size=64m,ro
-  says 5 "$readonly_work" 'name another directory' "${run[@]}" --GraphMatching.work_path "$disk"
+  says 5 "$readonly_work" "${run[@]}" --GraphMatching.work_path "$disk"
   umount "$disk"
 
   fresh
   mounted size=1m
   fill
-  says 5 "$full_work" "$freed" "${run[@]}" --GraphMatching.work_path "$disk"
+  says 5 "$full_work" "${run[@]}" --GraphMatching.work_path "$disk"
   # Enough for what COLMAP prints first, but not for anything else.
   rm "$disk/filling"
-  says 5 "$small_work" "$freed" "${run[@]}" --GraphMatching.work_path "$disk"
+  says 5 "$small_work" "${run[@]}" --GraphMatching.work_path "$disk"
   remounted size=64m
   expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.work_path "$disk"
   snapshot after
@@ -501,7 +509,7 @@ END
   mounted size=64m
   : >"$disk/filling"
   options=(--GraphMatching.max_pairs_per_shard 4 --SiftMatching.num_threads 1 --GraphMatching.work_path "$disk")
-  partial=yes says 5 "$filling_work" "$freed" "$matcher" --database_path "$database" \
+  partial=yes says 5 "$filling_work" "$matcher" --database_path "$database" \
     --colmap_path "$work/programs/filling" "${options[@]}"
   kept=$(wc -l <"$work/pairs.after")
   ((kept > 0 && kept < $(wc -l <"$work/big.pairs"))) || fail "$kept rows were kept"
@@ -512,65 +520,64 @@ END
   umount "$disk"
 fi
 fresh
-TMPDIR=$work/none says 5 '`$TMPDIR` is missing' 'make it, or name another directory' "${run[@]}"
-says 5 '`work_path` is missing' 'make it, or name another directory' "${run[@]}" --GraphMatching.work_path "$work/none"
-says 5 '`work_path` is a file' 'name a directory' "${run[@]}" --GraphMatching.work_path "$work/protected"
+TMPDIR=$work/none says 5 '`$TMPDIR` is missing' "${run[@]}"
+says 5 '`work_path` is missing' "${run[@]}" --GraphMatching.work_path "$work/none"
+says 5 '`work_path` is a file' "${run[@]}" --GraphMatching.work_path "$work/protected"
 
 theme colmap
-other='name a COLMAP that works with `--colmap_path`'
 # program NAME: standard input as a program that is taken for COLMAP.
 program() {
   cat >"$work/programs/$1"
   chmod +x "$work/programs/$1"
 }
-# with CODE WHAT HOW_TO_GO_ON NAME: a run with that program.
-with() { says "$1" "$2" "$3" "$matcher" --database_path "$database" --colmap_path "$work/programs/$4"; }
+# with CODE WHAT NAME: a run with that program.
+with() { says "$1" "$2" "$matcher" --database_path "$database" --colmap_path "$work/programs/$3"; }
 fresh
-with 4 'There is no such program' "$other" none
-says 4 'There is no such program on the PATH' 'install COLMAP, or name it' \
+with 4 'There is no such program' none
+says 4 'There is no such program on the PATH' \
   "$matcher" --database_path "$database" --colmap_path no-such-colmap
 mkdir "$work/programs/directory"
-with 4 'It is a directory' "$other" directory
+with 4 'It is a directory' directory
 program not-executable <<<'#!/bin/bash'
 chmod 644 "$work/programs/not-executable"
-with 4 'It may not be executed' "$other" not-executable
+with 4 'It may not be executed' not-executable
 program no-program <<<'a text'
-with 4 'It is no program' "$other" no-program
+with 4 'It is no program' no-program
 program no-interpreter <<<'#!/no/interpreter'
-with 4 'What interprets it is missing' "$other" no-interpreter
-says 4 'It does nothing (`/bin/true`)' "$other" \
+with 4 'What interprets it is missing' no-interpreter
+says 4 'It does nothing (`/bin/true`)' \
   "$matcher" --database_path "$database" --colmap_path /bin/true
-says 4 'It only fails (`/bin/false`)' "$other" \
+says 4 'It only fails (`/bin/false`)' \
   "$matcher" --database_path "$database" --colmap_path /bin/false
 program rubbish <<'END'
 #!/bin/bash
 head -c 5000000 /dev/urandom
 END
-with 4 'It prints rubbish, megabytes of it' "$other" rubbish
+with 4 'It prints rubbish, megabytes of it' rubbish
 program digits <<'END'
 #!/bin/bash
 echo "COLMAP $(head -c 3000000 /dev/zero | tr '\0' 1).8"
 END
-with 4 'It prints a version of a million digits' "$other" digits
+with 4 'It prints a version of a million digits' digits
 program long-line <<'END'
 #!/bin/bash
 head -c 3000000 /dev/zero | tr '\0' x
 exit 3
 END
-with 4 'It prints megabytes and fails' "$other" long-line
-FAKE_COLMAP_VERSION='COLMAP 3.7' says 4 'It is too old' 'install COLMAP 3.8 or later' "${run[@]}"
+with 4 'It prints megabytes and fails' long-line
+FAKE_COLMAP_VERSION='COLMAP 3.7' says 4 'It is too old' "${run[@]}"
 program crash <<'END'
 #!/bin/bash
 kill -SEGV $$
 END
-with 4 'It crashes at once' "$other" crash
+with 4 'It crashes at once' crash
 slow='It hangs at once, for longer than 60 s'
 program hangs <<'END'
 #!/bin/bash
 exec sleep 1000
 END
 if [[ ${GRAPHMATCH_SLOW_TESTS:-} == 1 ]]; then
-  with 4 "$slow" "$other" hangs
+  with 4 "$slow" hangs
 else
   skip "$slow" 'it takes a minute; GRAPHMATCH_SLOW_TESTS=1 runs it'
 fi
@@ -579,30 +586,29 @@ program no-creator <<END
 [[ \$1 != database_creator ]] || exit 7
 exec "$fake" "\$@"
 END
-with 4 'It makes no database for a shard' "$other" no-creator
-kept='see what COLMAP printed; the same command goes on'
+with 4 'It makes no database for a shard' no-creator
 export FAKE_COLMAP_FAULT_PAIR=all
-FAKE_COLMAP_FAULT=crash partial=yes says 4 'It crashes on every pair' "$kept" "${run[@]}"
+FAKE_COLMAP_FAULT=crash partial=yes says 4 'It crashes on every pair' "${run[@]}"
 fresh
-FAKE_COLMAP_FAULT=exit partial=yes says 4 'It fails on every pair' "$kept" "${run[@]}"
+FAKE_COLMAP_FAULT=exit partial=yes says 4 'It fails on every pair' "${run[@]}"
 fresh
-FAKE_COLMAP_FAULT=hang partial=yes says 4 'It hangs on every pair, for longer than `timeout_per_pair`' \
-  'look why; raise `timeout_per_pair` on a slow machine' \
+FAKE_COLMAP_FAULT=hang partial=yes advice='raise `timeout_per_pair` on a slow machine' \
+  says 4 'It hangs on every pair, for longer than `timeout_per_pair`' \
   "${run[@]}" --GraphMatching.timeout_per_pair 0.1 --GraphMatching.max_pairs_per_shard 1
 fresh
-FAKE_COLMAP_FAULT=short partial=yes says 4 'It ends well, but writes no results' "$kept" "${run[@]}"
+FAKE_COLMAP_FAULT=short partial=yes says 4 'It ends well, but writes no results' "${run[@]}"
 fresh
-FAKE_COLMAP_FAULT=nonsense partial=yes says 4 'It writes matches of features that there are not' "$kept" "${run[@]}"
+FAKE_COLMAP_FAULT=nonsense partial=yes says 4 'It writes matches of features that there are not' "${run[@]}"
 [[ $(sqlite3 "$database" 'SELECT count(*) FROM two_view_geometries WHERE rows > 0') == 0 ]] ||
   fail 'nonsense was kept'
 unset FAKE_COLMAP_FAULT_PAIR
 fresh
-FAKE_COLMAP_FAULT=exit FAKE_COLMAP_FAULT_PAIR='1 2' says 0 'It fails on one pair' \
-  'nothing to do: the next run tries it again' "${run[@]}"
+FAKE_COLMAP_FAULT=exit FAKE_COLMAP_FAULT_PAIR='1 2' advice='the next run tries it again' \
+  says 0 'It fails on one pair' "${run[@]}"
 fresh
 change 'PRAGMA foreign_keys = ON; DELETE FROM images WHERE image_id > 4; DELETE FROM descriptors WHERE image_id > 4'
 piece='COLMAP failed on all' FAKE_COLMAP_FAULT=exit FAKE_COLMAP_FAULT_PAIR=all \
-  says 4 'It fails on every pair, of however few' "$kept" "${run[@]}"
+  says 4 'It fails on every pair, of however few' "${run[@]}"
 fresh
 FAKE_COLMAP_FAULT=crash FAKE_COLMAP_FAULT_PAIR='1 2' FAKE_COLMAP_FAULT_TIMES=1 FAKE_COLMAP_LOG=$work/faults \
   works 'It is killed once in the middle'
@@ -624,95 +630,91 @@ run=("$matcher" --database_path "$database" --colmap_path "$work/programs/wrappe
 works 'It is a script with spaces and quotes in its path'
 
 theme options
-mend='correct the option; `graphmatch_matcher -h` lists them'
 fresh
-piece="unrecognised option '--no_such_option'" says 1 'There is no such option' "$mend" "${run[@]}" --no_such_option 1
-says 1 'A word instead of a number' "$mend" "${run[@]}" --SiftMatching.max_ratio zero
-says 1 'A number outside its range' "$mend" "${run[@]}" --GraphMatching.max_num_neighbors 0
-says 1 'Two spellings of an option with different values' "$mend" "${run[@]}" --SiftMatching.max_error 4 \
+piece="unrecognised option '--no_such_option'" says 1 'There is no such option' "${run[@]}" --no_such_option 1
+says 1 'A word instead of a number' "${run[@]}" --SiftMatching.max_ratio zero
+says 1 'A number outside its range' "${run[@]}" --GraphMatching.max_num_neighbors 0
+says 1 'Two spellings of an option with different values' "${run[@]}" --SiftMatching.max_error 4 \
   --TwoViewGeometry.max_error 5
-says 1 'A word that is none of those allowed' "$mend" \
+says 1 'A word that is none of those allowed' \
   "${run[@]}" --GraphMatching.matcher gpu
-piece='contradict each other' says 1 'Two options contradict each other' "$mend" "${run[@]}" \
+piece='contradict each other' says 1 'Two options contradict each other' "${run[@]}" \
   --GraphMatching.strategy exhaustive --GraphMatching.match_list_path "$work/protected"
-piece='--SiftMatching.max_ratio' says 1 'The value of an option is missing' "$mend" "${run[@]}" --SiftMatching.max_ratio
-piece='belongs to no option' says 1 'A word that belongs to no option' "$mend" "${run[@]}" pairs.txt
-piece='--database_path' says 1 'There is no `--database_path`' "$mend" "$matcher" --colmap_path "$fake"
-project='name a project file as COLMAP writes it'
-piece='Cannot read the project file' says 1 'The project file is missing' "$project" \
+piece='--SiftMatching.max_ratio' says 1 'The value of an option is missing' "${run[@]}" --SiftMatching.max_ratio
+piece='belongs to no option' says 1 'A word that belongs to no option' "${run[@]}" pairs.txt
+piece='--database_path' says 1 'There is no `--database_path`' "$matcher" --colmap_path "$fake"
+piece='Cannot read the project file' says 1 'The project file is missing' \
   "${run[@]}" --project_path "$work/none.ini"
-piece='Cannot read the project file' bound_says 1 'You may not read the project file' "$project" \
+piece='Cannot read the project file' bound_says 1 'You may not read the project file' \
   "${run[@]}" --project_path "$work/protected"
 printf '[SiftMatching]\nthis is no option\n' >"$work/wrong.ini"
-piece='this is no option' says 1 'A line of the project file cannot be understood' "$project" \
+piece='this is no option' says 1 'A line of the project file cannot be understood' \
   "${run[@]}" --project_path "$work/wrong.ini"
 printf '[SiftMatching]\nmax_ratio=zero\n' >"$work/wrong.ini"
-piece='it must be a number greater than 0' says 1 'A value in the project file is wrong' "$project" \
+piece='it must be a number greater than 0' says 1 'A value in the project file is wrong' \
   "${run[@]}" --project_path "$work/wrong.ini"
 list=(--GraphMatching.match_list_path "$work/pairs.txt")
-names='correct the list'
-says 5 'The list of pairs is missing' "$names" "${run[@]}" "${list[@]}"
+says 5 'The list of pairs is missing' "${run[@]}" "${list[@]}"
 : >"$work/pairs.txt"
-says 5 'The list of pairs is empty' "$names" "${run[@]}" "${list[@]}"
-says 5 'The list of pairs is a directory' "$names" "${run[@]}" --GraphMatching.match_list_path "$place"
-bound_says 5 'You may not read the list of pairs' "$names" "${run[@]}" --GraphMatching.match_list_path "$work/protected"
+says 5 'The list of pairs is empty' "${run[@]}" "${list[@]}"
+says 5 'The list of pairs is a directory' "${run[@]}" --GraphMatching.match_list_path "$place"
+bound_says 5 'You may not read the list of pairs' "${run[@]}" --GraphMatching.match_list_path "$work/protected"
 echo 'a.jpg b.jpg' >"$work/pairs.txt"
-says 5 'The list names no image of the database' "$names" "${run[@]}" "${list[@]}"
+says 5 'The list names no image of the database' "${run[@]}" "${list[@]}"
 echo 'place0/photo 0.jpg place0/photo 1.jpg' >>"$work/pairs.txt"
-says 0 'Some lines of the list name no image of the database' 'correct the list and run it again' \
+says 0 'Some lines of the list name no image of the database' \
   "${run[@]}" "${list[@]}"
 [[ $(wc -l <"$work/pairs.after") == 2 ]] || fail 'not one pair was tested'
 
-says 5 'The list of images that look for partners is missing' "$names" "${run[@]}" \
+says 5 'The list of images that look for partners is missing' "${run[@]}" \
   --VocabTreeMatching.match_list_path "$work/images.txt"
 fresh
-given='correct the file'
 replay=(--GraphMatching.replay_path "$work/edges.tsv")
-says 5 'The finished graph to be replayed is missing' "$given" "${run[@]}" "${replay[@]}"
+says 5 'The finished graph to be replayed is missing' "${run[@]}" "${replay[@]}"
 printf 'a.jpg\tb.jpg\t20\n' >"$work/edges.tsv"
-says 5 'The finished graph names no image of the database' "$given" "${run[@]}" "${replay[@]}"
+says 5 'The finished graph names no image of the database' "${run[@]}" "${replay[@]}"
 echo 'a.jpg b.jpg' >>"$work/edges.tsv"
-says 5 'A line of the finished graph cannot be understood' "$given" "${run[@]}" "${replay[@]}"
+says 5 'A line of the finished graph cannot be understood' "${run[@]}" "${replay[@]}"
 printf 'a.jpg\tb.jpg\n' >"$work/ranked.tsv"
-says 5 'A line of the ranked lists cannot be understood' "$given" "${run[@]}" \
+says 5 'A line of the ranked lists cannot be understood' "${run[@]}" \
   --GraphMatching.ranking_path "$work/ranked.tsv"
 vectors=(--GraphMatching.descriptor file --GraphMatching.vectors_path "$work/vectors.npy")
-says 5 'The file of vectors is missing' "$given" "${run[@]}" "${vectors[@]}"
+says 5 'The file of vectors is missing' "${run[@]}" "${vectors[@]}"
 echo 'no array' >"$work/vectors.npy"
-says 5 'The file of vectors is no NumPy array' "$given" "${run[@]}" "${vectors[@]}"
-piece='belong together' says 1 'Vectors of a file are asked for, and no file is given' "$mend" "${run[@]}" \
+says 5 'The file of vectors is no NumPy array' "${run[@]}" "${vectors[@]}"
+piece='belong together' says 1 'Vectors of a file are asked for, and no file is given' "${run[@]}" \
   --GraphMatching.descriptor file
-piece='give --image_path' says 1 'GIST without the photos' "$mend" "${run[@]}" --GraphMatching.descriptor gist
-piece='No such file or directory. Is --image_path' says 5 'A photo is missing, for GIST' 'name the directory of the photos' "${run[@]}" \
+piece='give --image_path' says 1 'GIST without the photos' "${run[@]}" --GraphMatching.descriptor gist
+piece='Is --image_path' says 5 'A photo is missing, for GIST' "${run[@]}" \
   --GraphMatching.descriptor gist --image_path "$work"
-says 5 'The log of tests cannot be written' 'name another file' "${run[@]}" --GraphMatching.test_log "$work/none/log.csv"
-partial=yes says 5 'The report cannot be written' 'name another file' "${run[@]}" \
+says 5 'The log of tests cannot be written' "${run[@]}" --GraphMatching.test_log "$work/none/log.csv"
+partial=yes says 5 'The report cannot be written' "${run[@]}" \
   --GraphMatching.report "$work/none/report.json"
-says 5 'The list of edges cannot be written' 'name another file' "${run[@]}" \
+says 5 'The list of edges cannot be written' "${run[@]}" \
   --GraphMatching.export_pairs "$work/none/pairs.txt"
-says 5 'The graph cannot be written' 'name another file' "${run[@]}" --GraphMatching.export_graph "$work/none/graph.dot"
-says 5 'The log cannot be written' 'name another file' "${run[@]}" --log_path "$work/none/log.txt"
-says 5 'A list is a device' "$names" "${run[@]}" --GraphMatching.match_list_path /dev/zero
+says 5 'The graph cannot be written' "${run[@]}" --GraphMatching.export_graph "$work/none/graph.dot"
+says 5 'The log cannot be written' "${run[@]}" --log_path "$work/none/log.txt"
+says 5 'A list is a device' "${run[@]}" --GraphMatching.match_list_path /dev/zero
 cp "$database" "$place/other.db"
-says 5 'A file to write is another database' 'name another file' "${run[@]}" \
+says 5 'A file to write is another database' "${run[@]}" \
   --GraphMatching.export_pairs "$place/other.db"
 rm "$place/other.db"
 echo 'my own names' >"$place/vectors.txt"
-says 5 'What is written beside a file would take the place of one of yours' 'move it, or name another file' "${run[@]}" \
+says 5 'What is written beside a file would take the place of one of yours' "${run[@]}" \
   --GraphMatching.export_vectors "$place/vectors.npy"
 rm "$place/vectors.txt"
-says 1 'A file to write belongs to the database' 'name another file' "${run[@]}" \
+says 1 'A file to write belongs to the database' "${run[@]}" \
   --GraphMatching.export_pairs "$database-wal"
-says 1 'A file to write is the database' 'name another file' "${run[@]}" --GraphMatching.export_pairs "$database"
-says 1 'The log is the database' 'name another file' "${run[@]}" --log_path "$database"
-says 1 'Two files to write are one' 'name another file' "${run[@]}" --GraphMatching.report "$place/run.html" \
+says 1 'A file to write is the database' "${run[@]}" --GraphMatching.export_pairs "$database"
+says 1 'The log is the database' "${run[@]}" --log_path "$database"
+says 1 'Two files to write are one' "${run[@]}" --GraphMatching.report "$place/run.html" \
   --GraphMatching.export_pairs "$place/run.json"
-says 1 'There is no directory of photos' 'give the right one' "${run[@]}" --image_path "$place/photos"
+says 1 'There is no directory of photos' "${run[@]}" --image_path "$place/photos"
 
 theme output
 works_with() {
   fresh
-  says 0 "$1" "$nothing" bash -c "$2" bash "${run[@]}"
+  says 0 "$1" bash -c "$2" bash "${run[@]}"
   expect_results small
 }
 works_with 'Standard output and standard error are closed' '"$@" >&- 2>&-'
@@ -721,12 +723,28 @@ works_with 'Standard output is closed' '"$@" >&-'
 works_with 'Standard output goes to a full disk' '"$@" >/dev/full'
 works_with 'Both go to a full disk' '"$@" >/dev/full 2>&1'
 fresh
-says 0 'The log goes to a full disk' "$nothing" "${run[@]}" --log_path /dev/full
+says 0 'The log goes to a full disk' "${run[@]}" --log_path /dev/full
 works_with 'Nobody reads the output (a pipe to a program that ends)' '"$@" 2>&1 | true; exit "${PIPESTATUS[0]}"'
-says 0 'The help goes to a full disk' "$nothing" bash -c '"$@" >/dev/full' bash "$matcher" -h
+says 0 'The help goes to a full disk' bash -c '"$@" >/dev/full' bash "$matcher" -h
 
-# The document with the rows of this run in place of its own.
-header='| What happened | Exit code | Message | How to go on |'
+# print_table FILE: cases with the same message share a row; those without one and without an error follow in a line.
+print_table() {
+  awk -F '\t' '
+    $2 == 0 && $3 == "-" { quiet = quiet (quiet == "" ? "" : "; ") $1; next }
+    { key = $2 FS $3 }
+    !(key in cases) { keys[++count] = key; cases[key] = $1; next }
+    { cases[key] = cases[key] "<br>" $1 }
+    END {
+      if (count > 0) print "| What happened | Exit code | Message |\n|---|---|---|"
+      for (i = 1; i <= count; ++i) {
+        split(keys[i], said, FS)
+        print "| " cases[keys[i]] " | " said[1] " | " said[2] " |"
+      }
+      if (quiet != "") print (count > 0 ? "\n" : "") "No message, exit code 0: " quiet "."
+    }' "$1"
+}
+
+# The document with what this run saw in place of its own tables.
 while IFS= read -r line; do
   [[ ${inside:-no} == no || $line == '<!-- end of table -->' ]] || continue
   inside=no
@@ -734,8 +752,7 @@ while IFS= read -r line; do
   if [[ $line =~ ^'<!-- table: '([a-z]+)' -->'$ ]]; then
     inside=yes
     table=$work/tables/${BASH_REMATCH[1]}
-    printf '%s\n|---|---|---|---|\n' "$header"
-    cat "$table"
+    print_table "$table"
     mv "$table" "$table.used"
   fi
 done <"$document" >"$work/errors.md"

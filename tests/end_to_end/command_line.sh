@@ -13,7 +13,13 @@ mkdir -p "$TMPDIR"
 run=("$matcher" --database_path "$database" --colmap_path "$fake")
 
 echo "== Options"
-expect_exit 0 '--GraphMatching.max_tests_for_sampling' "$matcher" -h
+expect_exit 0 'graphmatch_matcher --help-all' "$matcher" -h
+"$matcher" -h >"$work/short.txt"
+"$matcher" --help | diff "$work/short.txt" - || fail '-h and --help differ'
+lines=$(wc -l <"$work/short.txt")
+((24 <= lines && lines <= 40)) || fail "-h has $lines lines"
+[[ $(wc -L <"$work/short.txt") -le 100 ]] || fail '-h has longer lines than 100'
+expect_exit 0 '--TwoViewGeometry.max_error' "$matcher" --help-all
 expect_exit 0 'graphmatch_matcher 0.' "$matcher" --version
 expect_exit 1 '--database_path is missing' "$matcher"
 expect_exit 1 "unrecognised option '--no_such_option'" "${run[@]}" --no_such_option 1

@@ -19,7 +19,7 @@ faults=$(groff -man -ww -Tutf8 "$page" 2>&1 >/dev/null)
 # As it is read, without line breaks within names.
 MANWIDTH=500 mandoc -Tascii -O width=500 "$page" | col -b >"$work/page.txt"
 # shellcheck disable=SC2016  # The backticks are those of the document.
-names=$(sed -n -E 's/^\| `([^`]+)`.*/\1/p' "$documents/options.md"
+names=$(sed -n -E -e 's/^\| `([^`]+)`.*/\1/p' -e 's/^  `([^`]+)`$/\1/p' "$documents/options.md"
   grep -o -E '[0-9]: `[^`]+`' "$documents/options.md" | sed -E 's/.*`(.*)`/\1/')
 count=0
 while IFS= read -r name; do

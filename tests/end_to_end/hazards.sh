@@ -50,6 +50,14 @@ wait_for() {
   fail "in vain: $*"
 }
 
+# handles PID: the program has its handlers of SIGINT and SIGTERM. (Before, it ignores the one, as all that a shell starts
+# in the background does, and ends by the other.)
+handles() {
+  local caught
+  caught=$(sed -n 's/^SigCgt:\t/0x/p' "/proc/$1/status")
+  (((caught & 0x4002) == 0x4002))
+}
+
 echo "== Outputs and what is beside them"
 fresh small
 cp database.db pairs.txt.partial
@@ -134,7 +142,12 @@ mkfifo pipe
 for option in --GraphMatching.match_list_path --VocabTreeMatching.match_list_path --GraphMatching.ranking_path \
   --GraphMatching.replay_path --project_path; do
   # Nobody writes into the pipe: it is waited for, until Ctrl-C.
-  timeout --signal=INT 1 "${run[@]}" "$option" pipe >"$work/output.txt" 2>&1 && fail "$option: a pipe without a writer"
+  "${run[@]}" "$option" pipe >"$work/output.txt" 2>&1 &
+  pid=$!
+  wait_for handles "$pid"
+  sleep 0.2
+  kill -INT "$pid"
+  ! wait "$pid" || fail "$option: a pipe without a writer"
   grep -q 'Stopped as asked' "$work/output.txt" || { cat "$work/output.txt"; fail "$option"; }
 done
 expect_exit 5 'it is a pipe' timeout 60 "${run[@]}" --GraphMatching.descriptor file --GraphMatching.vectors_path pipe
@@ -236,6 +249,7 @@ for signal in INT TERM; do
   SECONDS=0
   "${run[@]}" --GraphMatching.lock_timeout 25 >"$work/output.txt" 2>&1 &
   pid=$!
+  wait_for handles "$pid"
   sleep 1
   kill "-$signal" "$pid"
   code=0
@@ -273,7 +287,8 @@ done
 fresh small
 FAKE_COLMAP_HELP_DELAY_MS=20000 "${run[@]}" >"$work/output.txt" 2>&1 &
 pid=$!
-sleep 0.7
+wait_for handles "$pid"
+sleep 0.2
 kill -TERM "$pid"
 code=0
 wait "$pid" || code=$?

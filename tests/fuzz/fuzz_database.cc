@@ -53,7 +53,10 @@ class Fuzzer {
 
   void Read(std::size_t choice) {
     Database database(path_, sqlite::Access::kReadWrite, 0);
-    Try([&] { database.ReadTestedPairs(); });
+    Try([&] {
+      for (const TestedPair& tested : database.ReadTestedPairs()) database.ReadInliers(tested.pair);
+    });
+    Try([&] { database.ReadCameras(); });
     std::vector<ImagePair> unverified;
     Try([&] { unverified = database.ReadUnverifiedPairs(); });
     const std::vector<ImageRecord> images = WithFeatures(database.ReadImages());
@@ -68,7 +71,7 @@ class Fuzzer {
 
     std::vector<ShardPair> pairs;
     for (std::size_t i = 0; i + 1 < num_images; ++i) {
-      pairs.push_back({ImagePair(images[i].id, images[i + 1].id), sqlite::Blob(16)});
+      pairs.push_back({ImagePair(images[i].id, images[i + 1].id), FeatureMatches(2)});
     }
     // The matches of these are in the database.
     for (std::size_t i = 0; i < std::min(unverified.size(), kMaxImages); ++i) {
@@ -85,12 +88,14 @@ class Fuzzer {
           num_features[pair.pair.id1] = 10;
           num_features[pair.pair.id2] = 10;
         }
-        ReadShard(shard, pairs, num_features);
+        std::vector<ImagePair> asked;
+        for (const ShardPair& pair : pairs) asked.push_back(pair.pair);
+        ReadShard(shard, asked, num_features);
       });
     }
-    PairRows rows;
-    rows.pair = pairs.empty() ? ImagePair(1, 2) : pairs.front().pair;
-    database.WritePairs({rows});
+    PairGeometry result;
+    result.pair = pairs.empty() ? ImagePair(1, 2) : pairs.front().pair;
+    database.WritePairs({result});
   }
 
   // What cannot be read must not hide what comes after it.

@@ -25,7 +25,7 @@ cd /trial/home
 export QT_QPA_PLATFORM=offscreen
 graphmatch_matcher --version
 help=$(graphmatch_matcher -h)
-[[ $help == *--database_path* ]] || fail "graphmatch_matcher -h: $help"
+[[ $help == *--database_path*--help-all* ]] || fail "graphmatch_matcher -h: $help"
 zcat /usr/share/man/man1/graphmatch_matcher.1.gz >page.1
 grep -q '^\.TH GRAPHMATCH_MATCHER 1' page.1 || fail "the man page"
 for file in bash-completion/completions/graphmatch_matcher zsh/vendor-completions/_graphmatch_matcher \

@@ -150,8 +150,9 @@ int Main(const std::vector<std::string>& arguments) {
   }
   const std::string group = "--" + Environment("FAKE_COLMAP_GROUP", "SiftMatching") + ".";
   const std::vector<std::string> known = {
-      group + "use_gpu", group + "num_threads", group + "max_ratio", group + "min_num_inliers",
-      "--database_path", "--match_list_path",   "--match_type"};
+      group + "use_gpu",         group + "num_threads",    group + "max_ratio",
+      group + "min_num_inliers", group + "max_num_trials", group + "min_inlier_ratio",
+      "--database_path",         "--match_list_path",      "--match_type"};
   if (arguments.size() > 1 && arguments[1] == "-h") {
     for (const std::string& option : known) std::cout << "  " << option << " arg\n";
     return 0;

@@ -49,6 +49,13 @@ class RecordingVerifier : public PairVerifier {
     return complete;
   }
 
+  // Of edges: the ids of the images.
+  const FeatureMatches& Inliers(const ImagePair& pair) override {
+    inliers_.clear();
+    if (edges_.count(pair) > 0) inliers_.push_back({pair.id1, pair.id2});
+    return inliers_;
+  }
+
  private:
   VerifiedPair Answer(const ImagePair& pair) const {
     if (failing.count(pair) > 0) return {pair, PairOutcome::kFailed, 0};
@@ -58,6 +65,7 @@ class RecordingVerifier : public PairVerifier {
   }
 
   std::set<ImagePair> edges_;
+  FeatureMatches inliers_;
   mutable std::vector<VerifiedPair> known_pairs_;  // `known` with its answers.
 };
 

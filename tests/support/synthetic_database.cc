@@ -111,9 +111,12 @@ void WriteSyntheticDatabase(const std::filesystem::path& path, Schema schema,
     if (keypoints.data.empty()) {
       keypoints.num_rows = image.descriptors.num_rows;
       keypoints.num_cols = 4;
+      // Everywhere, and at the same place in every image: matches are inliers of one homography.
       for (std::size_t row = 0; row < keypoints.num_rows; ++row) {
         const auto value = static_cast<float>(row);
-        keypoints.data.insert(keypoints.data.end(), {value, value / 2, 1 + value / 10, 0});
+        keypoints.data.insert(keypoints.data.end(),
+                              {200 + static_cast<float>(row * 173 % 401),
+                               150 + static_cast<float>(row * 97 % 307), 1 + value / 10, 0});
       }
     }
     insert_image.Bind(1, id).Bind(2, image.name).Run();

@@ -171,7 +171,7 @@ void PrintManPage(std::ostream& stream, const std::string& date) {
             ".IR value ]...\n"
             ".br\n"
             ".B graphmatch_matcher\n"
-            ".BR \\-\\-help | \\-\\-version\n"
+            ".BR \\-\\-help | \\-\\-help\\-all | \\-\\-version\n"
             ".SH DESCRIPTION\n";
   PrintText(stream,
             "`graphmatch_matcher` finds which images of a COLMAP database show the same place, "

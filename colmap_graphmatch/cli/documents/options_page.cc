@@ -9,8 +9,11 @@
 namespace colmap_graphmatch {
 namespace {
 
-// "3.8: SiftMatching.max_error; 3.9: TwoViewGeometry.max_error".
+// "3.8: SiftMatching.max_error; 3.9: TwoViewGeometry.max_error"; "3.8" if it always had this name.
 std::string ColmapSpellings(const OptionRow& row) {
+  if (row.colmap.size() == 1 && row.colmap.front().name == row.name) {
+    return ToString(row.colmap.front().first);
+  }
   std::string text;
   std::string last;
   for (const ColmapSpelling& spelling : row.colmap) {
@@ -37,6 +40,8 @@ void PrintOptionsPage(std::ostream& stream) {
       << "# Options\n\n"
          "Generated from the table in `colmap_graphmatch/cli/option_table.cc`, which the program "
          "itself reads; tests hold it\nagainst what `colmap vocab_tree_matcher -h` prints.\n\n"
+         "- `graphmatch_matcher -h`, or `--help`, shows the ten that are used most; `--help-all` "
+         "shows all.\n"
          "- Every option of `colmap vocab_tree_matcher` of COLMAP 3.8 to 4.2 is accepted, in the "
          "spelling of any version. Those\n  of matching and verification may be given in each of "
          "the groups `SiftMatching`, `TwoViewGeometry` and\n  `FeatureMatching`. They reach COLMAP "
@@ -55,12 +60,22 @@ void PrintOptionsPage(std::ostream& stream) {
   CommandLine defaults;
   const std::vector<OptionRow> rows = MakeOptionTable(&defaults);
   std::string section;
+  std::string why_unused;
   for (const OptionRow& row : rows) {
+    const bool is_unused = row.use == OptionRow::Use::kUnused;
     if (row.section != section) {
       section = row.section;
       stream << "\n## " << section << "\n\n";
-      stream << "| option | must be | default | what it does | in COLMAP since |\n"
-                "|---|---|---|---|---|\n";
+      if (!is_unused) {
+        stream << "| option | must be | default | what it does | in COLMAP since |\n"
+                  "|---|---|---|---|---|\n";
+      }
+    }
+    if (is_unused) {
+      if (row.help != why_unused) stream << "- " << row.help << ":\n";
+      why_unused = row.help;
+      for (const std::string& name : row.names) stream << "  `" << name << "`\n";
+      continue;
     }
     const bool here = row.use == OptionRow::Use::kOwn || row.use == OptionRow::Use::kHere;
     stream << "| `" << row.name << "` | " << Cell(row.values) << " | "
