@@ -23,6 +23,14 @@
 #include "tests/support/reference_encoding.h"
 
 namespace colmap_graphmatch {
+
+class GmmEvaluatorPeer {
+ public:
+  static RowMatrixXf Responsibilities(const GmmEvaluator& evaluator, const RowMatrixXf& samples) {
+    return evaluator.Responsibilities(samples);
+  }
+};
+
 namespace {
 
 using ::testing::Each;
@@ -96,7 +104,8 @@ class GmmEvaluatorTest : public ::testing::TestWithParam<Shape> {
   }
 
   void ExpectResponsibilitiesOfTheReference(double tolerance) const {
-    const RowMatrixXf responsibilities = GmmEvaluator(mixture_).Responsibilities(samples_);
+    const RowMatrixXf responsibilities =
+        GmmEvaluatorPeer::Responsibilities(GmmEvaluator(mixture_), samples_);
     const RowMatrixXd expected = ReferenceResponsibilities(mixture_, samples_);
     ASSERT_EQ(responsibilities.rows(), expected.rows());
     ASSERT_EQ(responsibilities.cols(), expected.cols());
@@ -129,7 +138,8 @@ TEST_P(GmmEvaluatorTest, ResponsibilitiesAreAccurateWhenComponentsAreFarApart) {
 
 TEST_P(GmmEvaluatorTest, ResponsibilitiesSumToOne) {
   MakeMixture(2, 0);
-  const RowMatrixXf responsibilities = GmmEvaluator(mixture_).Responsibilities(samples_);
+  const RowMatrixXf responsibilities =
+      GmmEvaluatorPeer::Responsibilities(GmmEvaluator(mixture_), samples_);
   EXPECT_GE(responsibilities.minCoeff(), 0);
   for (Eigen::Index i = 0; i < responsibilities.rows(); ++i) {
     EXPECT_NEAR(responsibilities.row(i).cast<double>().sum(), 1, 1e-5);
@@ -199,7 +209,8 @@ TEST(GmmEvaluatorFarSampleTest, SamplesFarFromEveryComponentStillBelongToOne) {
   mixture.variances = RowMatrixXd::Constant(2, 3, 1e-4);
   RowMatrixXf samples(2, 3);
   samples << -50, 0, 0, 70, 0, 0;
-  const RowMatrixXf responsibilities = GmmEvaluator(mixture).Responsibilities(samples);
+  const RowMatrixXf responsibilities =
+      GmmEvaluatorPeer::Responsibilities(GmmEvaluator(mixture), samples);
   EXPECT_EQ(responsibilities(0, 0), 1);
   EXPECT_EQ(responsibilities(0, 1), 0);
   EXPECT_EQ(responsibilities(1, 0), 0);
@@ -211,7 +222,8 @@ TEST(GmmEvaluatorSiftTest, ResponsibilitiesOfSiftDescriptorsAreThoseOfTheReferen
   const RowMatrixXf samples = SampleSiftLike(2000, &random);
   const GmmTraining training = Train(FixedIterations(20, 5), samples);
   ASSERT_EQ(training.mixture.NumComponents(), 20);
-  const RowMatrixXf responsibilities = GmmEvaluator(training.mixture).Responsibilities(samples);
+  const RowMatrixXf responsibilities =
+      GmmEvaluatorPeer::Responsibilities(GmmEvaluator(training.mixture), samples);
   const RowMatrixXd expected = ReferenceResponsibilities(training.mixture, samples);
   EXPECT_LT((responsibilities.cast<double>() - expected).cwiseAbs().maxCoeff(), 1e-3);
 }

@@ -1094,12 +1094,7 @@ TEST(Explore, ProposersLearnTheInliersOfEveryPair) {
 
 TEST(ReplayVerifier, AnswersFromTheGraph) {
   ReplayVerifier verifier({{ImagePair(1, 2), 30}});
-  verifier.SetKnownPairs({ImagePair(1, 3), ImagePair(2, 1)});
-  const std::vector<VerifiedPair>& known = verifier.KnownPairs();
-  ASSERT_EQ(known.size(), 2U);
-  EXPECT_EQ(known[0].outcome, PairOutcome::kEdge);
-  EXPECT_EQ(known[0].num_inliers, 30U);
-  EXPECT_EQ(known[1].outcome, PairOutcome::kNoEdge);
+  EXPECT_THAT(verifier.KnownPairs(), IsEmpty());
   std::vector<PairOutcome> outcomes;
   EXPECT_TRUE(verifier.Verify({ImagePair(1, 2), ImagePair(2, 3)},
                               [&](const VerifiedPair& pair) { outcomes.push_back(pair.outcome); }));

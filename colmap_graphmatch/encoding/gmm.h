@@ -65,10 +65,11 @@ class GmmEvaluator {
   // the same order whoever calls.
   void Accumulate(const Eigen::Ref<const RowMatrixXf>& samples, SufficientStatistics* sums) const;
 
-  // N x K responsibilities; every row sums to 1.
-  RowMatrixXf Responsibilities(const Eigen::Ref<const RowMatrixXf>& samples) const;
-
  private:
+  friend class GmmEvaluatorPeer;  // Of the tests.
+
+  // N x K; every row sums to 1.
+  RowMatrixXf Responsibilities(const Eigen::Ref<const RowMatrixXf>& samples) const;
   // Fills values with x - origin and (x - origin)^2 of a block of samples (N x 2 D) and
   // responsibilities (N x K), both padded by columns; returns the sum of the log-likelihoods.
   double EvaluateBlock(const Eigen::Ref<const RowMatrixXf>& samples, RowMatrixXf* values,

@@ -55,11 +55,13 @@ class DescriptorCache {
   // reader threw; the next request for the image tries again.
   const MatchingFeatures& Wait(const Handle& handle);
 
-  // Images read so far, and the most bytes that were kept at a time.
+  // Images read so far.
   std::size_t NumReads() const;
-  std::size_t MaxBytesKept() const;
 
  private:
+  friend class DescriptorCachePeer;  // Of the tests.
+
+  std::size_t MaxBytesKept() const;  // At a time, so far.
   struct Entry {
     ImageId image = 0;
     bool ready = false;

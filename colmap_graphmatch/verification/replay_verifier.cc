@@ -1,6 +1,5 @@
 #include "colmap_graphmatch/verification/replay_verifier.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace colmap_graphmatch {
@@ -19,15 +18,6 @@ ReplayVerifier::ReplayVerifier(std::unordered_map<ImagePair, ReplayedPair> pairs
 
 ReplayVerifier::ReplayVerifier(const std::unordered_map<ImagePair, std::uint32_t>& edges) {
   for (const auto& [pair, num_inliers] : edges) pairs_[pair] = {num_inliers, true, true};
-}
-
-void ReplayVerifier::SetKnownPairs(std::vector<ImagePair> pairs) {
-  std::sort(pairs.begin(), pairs.end());
-  known_pairs_.clear();
-  for (const ImagePair& pair : pairs) {
-    known_pairs_.push_back(Answer(pair));
-    known_pairs_.back().is_known = true;
-  }
 }
 
 void ReplayVerifier::SetCosts(std::unordered_map<ImageId, std::size_t> num_features,
@@ -58,8 +48,7 @@ bool ReplayVerifier::Verify(const std::vector<ImagePair>& pairs,
   for (const ImagePair& pair : pairs) {
     if (stop_ != nullptr && stop_->Requested()) return false;
     modelled_seconds_ += Cost(pair) / num_threads_;
-    const VerifiedPair* known = FindPair(known_pairs_, pair);
-    on_verified(known != nullptr ? *known : Answer(pair));
+    on_verified(Answer(pair));
   }
   return true;
 }

@@ -30,9 +30,6 @@ class ReplayVerifier : public PairVerifier {
   // Edges and their numbers of inliers.
   explicit ReplayVerifier(const std::unordered_map<ImagePair, std::uint32_t>& edges);
 
-  // Makes pairs known that were tested before the run; their outcomes come from the edges.
-  void SetKnownPairs(std::vector<ImagePair> pairs);
-
   // From these the time of tests is modelled. num_features: of every image that is asked for.
   // Without this, tests take no time.
   void SetCosts(std::unordered_map<ImageId, std::size_t> num_features, int num_threads);
@@ -59,7 +56,7 @@ class ReplayVerifier : public PairVerifier {
   double Cost(const ImagePair& pair) const;
 
   std::unordered_map<ImagePair, ReplayedPair> pairs_;
-  std::vector<VerifiedPair> known_pairs_;
+  std::vector<VerifiedPair> known_pairs_;  // None: nothing was tested before a replay.
   std::unordered_map<ImageId, std::size_t> num_features_;
   int num_threads_ = 1;
   std::function<FeatureMatches(const ImagePair&)> read_inliers_;
