@@ -203,6 +203,7 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<PairToVerify>& pairs, Tria
   } else {
     try {
       std::vector<ImagePair> asked;
+      asked.reserve(pairs.size());
       for (const PairToVerify& pair : pairs) asked.push_back(pair.pair);
       outcome.results = ReadShard(directory.Path() / "database.db", asked, NumFeatures(pairs));
     } catch (const DatabaseError& error) {
