@@ -28,8 +28,6 @@ namespace po = boost::program_options;
 
 constexpr char kSeeHelp[] = "`graphmatch_matcher --help-all` lists the options.";
 
-std::string WithoutGroup(const std::string& name) { return name.substr(name.find('.') + 1); }
-
 std::string Lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

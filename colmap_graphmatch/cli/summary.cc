@@ -36,11 +36,18 @@ std::string FormatVerification(const PipelineResult& result) {
         matching.num_matched, FormatDuration(matching.seconds),
         static_cast<double>(matching.num_image_reads) / static_cast<double>(matching.num_matched));
   }
-  const double both = matching.seconds + colmap.seconds;
-  if (both > 0) {
+  const FitStatistics& fits = result.fits;
+  if (fits.num_fitted > 0) {
+    text +=
+        fmt::format("Fits               {} pairs in {} of CPU time, {} settled without COLMAP\n",
+                    fits.num_fitted, FormatDuration(fits.seconds), fits.num_settled);
+  }
+  const double all = matching.seconds + fits.seconds + colmap.seconds;
+  const bool is_native = fits.num_fitted > 0 && colmap.seconds == 0;
+  if (all > 0 && !is_native) {
     text += fmt::format(
         "COLMAP             {} pairs in {}, summed over its processes: {:.0f} % of {}\n",
-        colmap.num_verified, FormatDuration(colmap.seconds), 100 * colmap.seconds / both,
+        colmap.num_verified, FormatDuration(colmap.seconds), 100 * colmap.seconds / all,
         "matching and verification");
   }
   return text;

@@ -307,7 +307,7 @@ void Pipeline::MatchAndVerify() {
   ExploreWith(verifier);
   result_.descriptor_matching = verifier.Statistics();
   result_.colmap = geometry.Colmap();
-  result_.screening = geometry.Screening();
+  result_.fits = geometry.Fits();
   database_->CheckInPlace();
 }
 

@@ -17,9 +17,9 @@
 #include "colmap_graphmatch/pipeline/run_record.h"
 #include "colmap_graphmatch/verification/batch_verifier.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
+#include "colmap_graphmatch/verification/in_process.h"
 #include "colmap_graphmatch/verification/options.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
-#include "colmap_graphmatch/verification/screened_verifier.h"
 
 namespace colmap_graphmatch {
 
@@ -111,7 +111,7 @@ struct PipelineResult {
   ExplorationResult matching;
   MatchingStatistics descriptor_matching;  // Without a replay:
   ColmapVerifier::Statistics colmap;       // what verification took,
-  ScreenedVerifier::Statistics screening;  // and the fits before it.
+  FitStatistics fits;                      // and the fits before or instead of it.
   int num_threads = 1;
   bool replayed = false;
   ImageRankingSeconds preprocessing_seconds;
