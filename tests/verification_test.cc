@@ -78,7 +78,7 @@ class VerifierTest : public ::testing::Test {
       inliers_[pair.pair] = verifier.Inliers(pair.pair);
     });
     statistics_ = verifier.Statistics();
-    screening_ = geometry.Screening();
+    fits_ = geometry.Fits();
     matched_here_ = plan.matches_here;
     EXPECT_THAT(ShardDirectories(work.Path()), IsEmpty());
     return complete;
@@ -121,7 +121,7 @@ class VerifierTest : public ::testing::Test {
   StopRequest stop_;
   std::map<ImagePair, PairOutcome> outcomes_;
   MatchingStatistics statistics_;
-  ScreenedVerifier::Statistics screening_;
+  FitStatistics fits_;
   bool matched_here_ = false;
   std::vector<std::string> warnings_;
 };
@@ -672,8 +672,8 @@ TEST_F(InProcessTest, ColmapIsTheJudgeOfWhatIsLikely) {
               SamePlace(pair) && IsFakeEdge(pair) ? PairOutcome::kEdge : PairOutcome::kNoEdge);
   }
   EXPECT_EQ(CountInLog("pair"), 50U);
-  EXPECT_EQ(screening_.num_screened, 50U);
-  EXPECT_EQ(screening_.num_settled, 0U);
+  EXPECT_EQ(fits_.num_fitted, 50U);
+  EXPECT_EQ(fits_.num_settled, 0U);
   EXPECT_THAT(Log(), Contains(AllOf(HasSubstr("--SiftMatching.max_num_trials=100"),
                                     HasSubstr("--SiftMatching.min_inlier_ratio=0.8"))));
   EXPECT_EQ(NumMatches(ImagePair(1, 2)), 30U);
@@ -684,7 +684,7 @@ TEST_F(InProcessTest, HopelessPairsAreSettledAndKeepTheirMatches) {
   Scatter(2, 0);
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
   EXPECT_EQ(outcomes_.at(ImagePair(1, 2)), PairOutcome::kNoEdge);
-  EXPECT_EQ(screening_.num_settled, 1U);
+  EXPECT_EQ(fits_.num_settled, 1U);
   EXPECT_EQ(CountInLog("pair"), 0U);
   EXPECT_EQ(NumMatches(ImagePair(1, 2)), 30U);
   sqlite::Connection connection(database_path_, sqlite::Access::kRead, 5);
@@ -720,7 +720,7 @@ TEST_F(InProcessTest, WhatTheFitCannotJudgeGoesToColmapWhole) {
   sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
       .Execute("UPDATE cameras SET params = zeroblob(8)");
   EXPECT_TRUE(Verify({ImagePair(1, 2)}));
-  EXPECT_EQ(screening_.num_screened, 0U);
+  EXPECT_EQ(fits_.num_fitted, 0U);
   EXPECT_THAT(Log(), Contains("given 1 2: 30"));
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("25 images have cameras")));
 }
@@ -752,6 +752,7 @@ TEST_F(InProcessTest, NativelyWithoutColmapOnAnyNumberOfThreads) {
       EXPECT_EQ(outcome, is_edge ? PairOutcome::kEdge : PairOutcome::kNoEdge);
     }
     EXPECT_EQ(CountInLog("run"), 0U);
+    EXPECT_EQ(fits_.num_fitted, 50U);
     if (num_threads > 1) {
       EXPECT_EQ(Dump(), dump);
     }
@@ -764,6 +765,14 @@ TEST_F(InProcessTest, NativelyWithoutColmapOnAnyNumberOfThreads) {
                            "6 AND length(H) = 72");
   select.Step();
   EXPECT_EQ(select.Int(0), 46);
+}
+
+TEST_F(InProcessTest, OptionsThatOnlyColmapHasAreMentioned) {
+  options_.verifier = VerificationOptions::Verifier::kNative;
+  options_.geometry.use_degensac = true;
+  options_.geometry.random_seed = 3;
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("have no effect: random_seed, use_degensac.")));
 }
 
 TEST_F(InProcessTest, MatchesThatAwaitVerificationAreVerifiedNativelyToo) {

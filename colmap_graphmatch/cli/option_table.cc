@@ -11,6 +11,7 @@
 
 #include "colmap_graphmatch/cli/option_values.h"
 #include "colmap_graphmatch/cli/options.h"
+#include "colmap_graphmatch/verification/colmap_installation.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -79,7 +80,7 @@ class Table {
   OptionRow& AddGrouped(Use use, std::vector<ColmapSpelling> colmap, Value value,
                         const std::string& help) {
     OptionRow& row = AddColmap(use, std::move(colmap), std::move(value), help);
-    const std::string short_name = row.name.substr(row.name.find('.') + 1);
+    const std::string short_name = WithoutGroup(row.name);
     for (const char* group : kMatchingGroups) AddName(group + short_name, &row);
     return row;
   }

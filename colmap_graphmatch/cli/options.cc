@@ -20,6 +20,7 @@
 #include "colmap_graphmatch/cli/option_table.h"
 #include "colmap_graphmatch/cli/option_values.h"
 #include "colmap_graphmatch/cli/run_files.h"
+#include "colmap_graphmatch/verification/colmap_installation.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -27,8 +28,6 @@ namespace {
 namespace po = boost::program_options;
 
 constexpr char kSeeHelp[] = "`graphmatch_matcher --help-all` lists the options.";
-
-std::string WithoutGroup(const std::string& name) { return name.substr(name.find('.') + 1); }
 
 std::string Lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),

@@ -36,11 +36,17 @@ std::string FormatCost(const VerificationCost& cost) {
         cost.num_matched, FormatDuration(cost.matching_seconds),
         static_cast<double>(cost.num_image_reads) / static_cast<double>(cost.num_matched));
   }
-  const double both = cost.matching_seconds + cost.colmap_seconds;
-  if (both > 0) {
+  if (cost.num_fitted > 0) {
+    text +=
+        fmt::format("Fits               {} pairs in {} of CPU time, {} settled without COLMAP\n",
+                    cost.num_fitted, FormatDuration(cost.fit_seconds), cost.num_settled);
+  }
+  const double all = cost.matching_seconds + cost.fit_seconds + cost.colmap_seconds;
+  const bool is_native = cost.num_fitted > 0 && cost.colmap_seconds == 0;
+  if (all > 0 && !is_native) {
     text += fmt::format(
         "COLMAP             {} pairs in {}, summed over its processes: {:.0f} % of {}\n",
-        cost.num_verified, FormatDuration(cost.colmap_seconds), 100 * cost.colmap_seconds / both,
+        cost.num_verified, FormatDuration(cost.colmap_seconds), 100 * cost.colmap_seconds / all,
         "matching and verification");
   }
   return text;

@@ -52,12 +52,10 @@ class Reader {
 void ReadDatabase(const std::filesystem::path& path, const sqlite::LockPatience& patience,
                   const std::vector<ImageRecord>& images, Reader* reader) {
   const auto database = std::make_shared<Database>(path, sqlite::Access::kRead, patience);
+  const std::vector<ImageRecord> replayed_images = database->ReadImages();
   std::unordered_map<ImageId, std::string> names;
-  std::unordered_map<std::string, ImageId> replayed_ids;
-  for (const ImageRecord& image : database->ReadImages()) {
-    names[image.id] = image.name;
-    replayed_ids[image.name] = image.id;
-  }
+  for (const ImageRecord& image : replayed_images) names[image.id] = image.name;
+  const std::unordered_map<std::string, ImageId> replayed_ids = IdsByName(replayed_images);
   const std::unordered_map<ImagePair, std::size_t> num_matches = database->ReadNumMatches();
   for (const TestedPair& tested : database->ReadTestedPairs()) {
     const auto name1 = names.find(tested.pair.id1);

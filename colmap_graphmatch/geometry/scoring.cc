@@ -21,6 +21,17 @@ struct EpipolarTerms {
   V a2, b2, a1, b1, numerator, denominator;
 };
 
+// Rows from i on, as many as there are lanes.
+template <class V>
+struct Rows {
+  V x1, y1, x2, y2;
+};
+template <class D>
+HWY_INLINE Rows<hn::Vec<D>> Load(D d, const PointColumns& columns, std::size_t i) {
+  return {hn::LoadU(d, columns.x1 + i), hn::LoadU(d, columns.y1 + i), hn::LoadU(d, columns.x2 + i),
+          hn::LoadU(d, columns.y2 + i)};
+}
+
 // A model, each entry in all lanes of a vector.
 template <class D>
 struct Model {
@@ -87,10 +98,7 @@ std::size_t CountFitting(const PointColumns& columns, std::size_t num, std::size
   for (std::size_t begin = 0; begin < num_padded; begin += kStep) {
     const std::size_t end = std::min(begin + kStep, num_padded);
     for (std::size_t i = begin; i < end; i += lanes) {
-      const auto x1 = hn::LoadU(d, columns.x1 + i);
-      const auto y1 = hn::LoadU(d, columns.y1 + i);
-      const auto x2 = hn::LoadU(d, columns.x2 + i);
-      const auto y2 = hn::LoadU(d, columns.y2 + i);
+      const auto [x1, y1, x2, y2] = Load(d, columns, i);
       if constexpr (kKind == ErrorKind::kEpipolar) {
         count += hn::CountTrue(d, model.FitsEpipolar(x1, y1, x2, y2, max_error));
       } else {
@@ -159,10 +167,7 @@ std::size_t EpipolarRows(const PointColumns& columns, std::size_t num, const flo
   const auto one = hn::Set(d, 1.0F);
   std::size_t count = 0;
   for (std::size_t i = 0; i < num; i += hn::Lanes(d)) {
-    const auto x1 = hn::LoadU(d, columns.x1 + i);
-    const auto y1 = hn::LoadU(d, columns.y1 + i);
-    const auto x2 = hn::LoadU(d, columns.x2 + i);
-    const auto y2 = hn::LoadU(d, columns.y2 + i);
+    const auto [x1, y1, x2, y2] = Load(d, columns, i);
     const auto terms = model.Epipolar(x1, y1, x2, y2);
     const auto fits =
         hn::Le(hn::Mul(terms.numerator, terms.numerator), hn::Mul(max_error, terms.denominator));
@@ -203,10 +208,7 @@ std::size_t HomographyRows(const PointColumns& columns, std::size_t num, const f
   const auto one = hn::Set(d, 1.0F);
   std::size_t count = 0;
   for (std::size_t i = 0; i < num; i += hn::Lanes(d)) {
-    const auto x1 = hn::LoadU(d, columns.x1 + i);
-    const auto y1 = hn::LoadU(d, columns.y1 + i);
-    const auto x2 = hn::LoadU(d, columns.x2 + i);
-    const auto y2 = hn::LoadU(d, columns.y2 + i);
+    const auto [x1, y1, x2, y2] = Load(d, columns, i);
     const auto fits = model.FitsHomography(x1, y1, x2, y2, max_error);
     count += hn::CountTrue(d, fits);
     const auto w = model.Affine(model.m20, model.m21, model.m22, x1, y1);

@@ -206,8 +206,9 @@ TwoViewVerdict VerifyTwoViews(const TwoViews& views, const TwoViewOptions& optio
       geometry.configuration == TwoViewConfiguration::kCalibrated) {
     geometry.pose = PoseOfEssential(*geometry.essential, search.Normalized(), geometry.inliers);
   }
-  if (options.detect_watermark && IsWatermark(views.camera1, views.camera2, views.matches,
-                                              geometry.inliers, options.max_error)) {
+  if (options.detect_watermark &&
+      IsWatermark(views.camera1, views.camera2, views.matches, geometry.inliers,
+                  options.watermark_max_error.value_or(options.max_error))) {
     geometry.configuration = TwoViewConfiguration::kWatermark;
   }
   return geometry;

@@ -22,6 +22,7 @@ struct TwoViewOptions {
   std::size_t max_num_trials = 10000;
   double min_inlier_ratio = 0.25;  // No trials for what fits fewer. 0: none is given.
   bool detect_watermark = true;
+  std::optional<double> watermark_max_error;  // Pixels; as max_error if it is not set.
   bool compute_relative_pose = false;
 };
 

@@ -55,15 +55,15 @@ class ByMatching : public RunVerification {
 
   std::variant<VerificationCost, ReplayCost> Cost() const override {
     const MatchingStatistics matching = verifier_.Statistics();
-    const ScreenedVerifier::Statistics screening = geometry_.Screening();
+    const FitStatistics fits = geometry_.Fits();
     const ColmapVerifier::Statistics colmap = geometry_.Colmap();
     VerificationCost cost;
     cost.matching_seconds = matching.seconds;
     cost.num_matched = matching.num_matched;
     cost.num_image_reads = matching.num_image_reads;
-    cost.screening_seconds = screening.seconds;
-    cost.num_screened = screening.num_screened;
-    cost.num_settled = screening.num_settled;
+    cost.fit_seconds = fits.seconds;
+    cost.num_fitted = fits.num_fitted;
+    cost.num_settled = fits.num_settled;
     cost.colmap_seconds = colmap.seconds;
     cost.num_verified = colmap.num_verified;
     cost.num_failed = matching.num_failed;

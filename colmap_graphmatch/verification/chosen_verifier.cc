@@ -3,6 +3,23 @@
 #include <utility>
 
 namespace colmap_graphmatch {
+namespace {
+
+// A native verifier has no use for some options, and does without them.
+void WarnOfColmapsOptions(const GeometryOptions& options,
+                          const std::function<void(const std::string&)>& on_warning) {
+  std::string names;
+  const auto add = [&names](const auto& value, const std::string& name) {
+    if (value) names += (names.empty() ? "" : ", ") + name;
+  };
+  add(options.random_seed, "random_seed");
+  add(options.use_degensac, "use_degensac");
+  add(options.use_sampson_refinement, "use_sampson_refinement");
+  if (names.empty()) return;
+  on_warning("Only COLMAP has these options of verification, which have no effect: " + names + ".");
+}
+
+}  // namespace
 
 ChosenVerifier::ChosenVerifier(const VerificationOptions& options, const VerificationPlan& plan,
                                const std::optional<ColmapInstallation>& colmap, Database& database,
@@ -23,6 +40,7 @@ ChosenVerifier::ChosenVerifier(const VerificationOptions& options, const Verific
                         : "their focal lengths count as not known."));
   }
   if (plan.verifier == Verifier::kNative) {
+    WarnOfColmapsOptions(options.geometry, on_warning);
     native_.emplace(options.geometry, std::move(cameras), database.ConfigurationOfUnmatched());
   } else {
     screened_.emplace(options.geometry, std::move(cameras), *colmap_);
@@ -39,8 +57,9 @@ ColmapVerifier::Statistics ChosenVerifier::Colmap() const {
   return colmap_ ? colmap_->SoFar() : ColmapVerifier::Statistics();
 }
 
-ScreenedVerifier::Statistics ChosenVerifier::Screening() const {
-  return screened_ ? screened_->SoFar() : ScreenedVerifier::Statistics();
+FitStatistics ChosenVerifier::Fits() const {
+  if (native_) return native_->SoFar();
+  return screened_ ? screened_->SoFar() : FitStatistics();
 }
 
 }  // namespace colmap_graphmatch

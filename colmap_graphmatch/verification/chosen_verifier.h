@@ -29,7 +29,7 @@ class ChosenVerifier {
   GeometryVerifier& Get();
 
   ColmapVerifier::Statistics Colmap() const;
-  ScreenedVerifier::Statistics Screening() const;
+  FitStatistics Fits() const;
 
  private:
   std::optional<ColmapVerifier> colmap_;

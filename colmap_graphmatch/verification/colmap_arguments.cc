@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/verification/colmap_installation.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -78,9 +79,6 @@ void AddGeometry(const GeometryOptions& geometry, Options* options) {
   }
 }
 
-// Without the group.
-std::string ShortName(const std::string& name) { return name.substr(name.find('.') + 1); }
-
 }  // namespace
 
 std::map<std::string, std::string> ColmapOptions(const VerificationOptions& options,
@@ -96,9 +94,9 @@ std::map<std::string, std::string> ColmapOptions(const VerificationOptions& opti
 
 void CheckOwners(const std::map<std::string, std::string>& colmap_options) {
   std::set<std::string> owned(kOtherPlaces.begin(), kOtherPlaces.end());
-  for (const GeometryOption& option : kGeometryOptions) owned.insert(ShortName(option.name));
+  for (const GeometryOption& option : kGeometryOptions) owned.insert(WithoutGroup(option.name));
   for (const auto& [name, value] : colmap_options) {
-    if (owned.count(ShortName(name)) == 0) continue;
+    if (owned.count(WithoutGroup(name)) == 0) continue;
     throw OptionsError(name + " has a place of its own: it does not belong to colmap_options.");
   }
 }

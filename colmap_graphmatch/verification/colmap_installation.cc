@@ -71,6 +71,8 @@ std::string Output(const std::vector<std::string>& command, const std::filesyste
 
 }  // namespace
 
+std::string WithoutGroup(const std::string& option) { return option.substr(option.find('.') + 1); }
+
 std::string ColmapInstallation::Version() const {
   return std::to_string(major) + "." + std::to_string(minor) +
          (patch > 0 ? "." + std::to_string(patch) : "");
@@ -78,7 +80,7 @@ std::string ColmapInstallation::Version() const {
 
 std::string ColmapInstallation::Spelling(const std::string& option) const {
   if (matcher_options.count(option) > 0) return option;
-  const std::string bare = option.substr(option.find('.') + 1);
+  const std::string bare = WithoutGroup(option);
   for (const char* group : {"SiftMatching.", "TwoViewGeometry.", "FeatureMatching."}) {
     if (matcher_options.count(group + bare) > 0) return group + bare;
   }

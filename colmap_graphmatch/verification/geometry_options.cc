@@ -14,7 +14,7 @@ void GeometryOptions::Check() const {
     if (is_share && !(*value >= 0 && *value <= 1)) {
       throw OptionsError(name + " must be from 0 to 1.");
     }
-    if (!(*value >= 0)) throw OptionsError(name + " must be at least 0.");
+    if (!is_share && !(*value > 0)) throw OptionsError(name + " must be greater than 0.");
   };
   check(max_error, "max_error", false);
   check(confidence, "confidence", true);

@@ -19,6 +19,7 @@ TwoViewOptions TwoViewOptionsOf(const GeometryOptions& options) {
   set(options.min_inlier_ratio, &two_view.min_inlier_ratio);
   set(options.detect_watermark, &two_view.detect_watermark);
   set(options.compute_relative_pose, &two_view.compute_relative_pose);
+  two_view.watermark_max_error = options.watermark_detection_max_error;
   two_view.min_num_trials = std::min(two_view.min_num_trials, two_view.max_num_trials);
   return two_view;
 }

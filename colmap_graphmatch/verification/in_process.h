@@ -17,6 +17,13 @@ namespace colmap_graphmatch {
 // With COLMAP's defaults for what is not set.
 TwoViewOptions TwoViewOptionsOf(const GeometryOptions& options);
 
+// Of the fits of a verifier, so far.
+struct FitStatistics {
+  double seconds = 0;           // CPU time, summed over threads.
+  std::size_t num_fitted = 0;   // Pairs,
+  std::size_t num_settled = 0;  // and those of them that COLMAP did not get.
+};
+
 // Whether the options ask for what COLMAP alone has: guided matching, several motions, planar
 // scenes by decree, the filter of stationary matches.
 bool NeedsColmap(const GeometryOptions& options);

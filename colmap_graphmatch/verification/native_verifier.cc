@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "colmap_graphmatch/base/stopwatch.h"
 #include "colmap_graphmatch/geometry/two_view.h"
 
 namespace colmap_graphmatch {
@@ -58,6 +59,7 @@ PairGeometry NativeVerifier::VerifyPair(const PairToVerify& pair) const {
 ShardOutcome NativeVerifier::Verify(const std::vector<PairToVerify>& pairs,
                                     const std::function<bool()>& should_stop) {
   ShardOutcome outcome;
+  const double start = ThreadCpuSeconds();
   for (const PairToVerify& pair : pairs) {
     outcome.stopped = should_stop();
     if (outcome.stopped) {
@@ -66,7 +68,16 @@ ShardOutcome NativeVerifier::Verify(const std::vector<PairToVerify>& pairs,
     }
     outcome.results.push_back(VerifyPair(pair));
   }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  statistics_.seconds += ThreadCpuSeconds() - start;
+  statistics_.num_fitted += pairs.size();
+  statistics_.num_settled += pairs.size();
   return outcome;
+}
+
+FitStatistics NativeVerifier::SoFar() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return statistics_;
 }
 
 }  // namespace colmap_graphmatch

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <mutex>
 #include <vector>
 
 #include "colmap_graphmatch/verification/geometry_options.h"
@@ -22,12 +23,17 @@ class NativeVerifier : public GeometryVerifier {
                       const std::function<bool()>& should_stop) override;
   TwoViewConfiguration ConfigurationOfUnmatched() const override { return unmatched_; }
 
+  // Of all calls of Verify so far.
+  FitStatistics SoFar() const;
+
  private:
   PairGeometry VerifyPair(const PairToVerify& pair) const;
 
   TwoViewOptions options_;
   CamerasOfImages cameras_;
   TwoViewConfiguration unmatched_;
+  mutable std::mutex mutex_;
+  FitStatistics statistics_;
 };
 
 }  // namespace colmap_graphmatch

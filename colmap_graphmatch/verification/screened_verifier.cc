@@ -12,13 +12,13 @@
 namespace colmap_graphmatch {
 namespace {
 
-// A pair whose best fit has fewer than this share of the inliers that an edge needs is settled:
-// COLMAP's fits have some more inliers than the fast one, but not a quarter more
-// (docs/benchmarks.md).
+// A pair whose best fit has fewer than this share of the inliers that an edge needs (13 of 15) is
+// settled: no edge of COLMAP's was among them (docs/benchmarks.md).
 constexpr double kMinShareOfInliers = 0.86;
 
-// A pair with fewer than this share is close: COLMAP gets it as it is, for whether it finds the
-// last inlier depends on how long it searches, and it ends the sooner the fewer outliers it has.
+// A pair with fewer than this share (21 of 15) is close: COLMAP gets it as it is. Whether it finds
+// the last inlier depends on how long it searches, which is the shorter the fewer outliers there
+// are.
 constexpr double kMaxCloseShare = 1.34;
 
 // COLMAP gets the matches within so many times max_error of a model: those that its own fit, which
@@ -31,7 +31,7 @@ ScreenedVerifier::ScreenedVerifier(const GeometryOptions& options, CamerasOfImag
                                    ColmapVerifier& colmap)
     : options_(options), cameras_(std::move(cameras)), colmap_(colmap) {}
 
-ScreenedVerifier::Statistics ScreenedVerifier::SoFar() const {
+FitStatistics ScreenedVerifier::SoFar() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return statistics_;
 }
@@ -47,7 +47,7 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
   std::vector<std::size_t> places_of_trimmed;
   std::vector<PairToVerify> whole;
   std::vector<std::size_t> places_of_whole;
-  Statistics statistics;
+  FitStatistics statistics;
   const double start = ThreadCpuSeconds();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (should_stop()) {
@@ -61,7 +61,7 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
       places_of_whole.push_back(i);
       continue;
     }
-    ++statistics.num_screened;
+    ++statistics.num_fitted;
     const ScreenedTwoViews screened =
         ScreenTwoViews({pair.pair, *cameras_.Of(pair.pair.id1), *cameras_.Of(pair.pair.id2),
                         pair.points, pair.distinctness},
@@ -109,7 +109,7 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
       ask_colmap(whole, places_of_whole, ColmapVerifier::Trials::kAsAsked)) {
     const std::lock_guard<std::mutex> lock(mutex_);
     statistics_.seconds += statistics.seconds;
-    statistics_.num_screened += statistics.num_screened;
+    statistics_.num_fitted += statistics.num_fitted;
     statistics_.num_settled += statistics.num_settled;
   }
   return outcome;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -19,12 +18,6 @@ namespace colmap_graphmatch {
 // What the fit cannot judge goes to COLMAP whole. What a pair gets depends on the pair alone.
 class ScreenedVerifier : public GeometryVerifier {
  public:
-  struct Statistics {
-    double seconds = 0;            // CPU time of the fits, summed over threads.
-    std::size_t num_screened = 0;  // Pairs,
-    std::size_t num_settled = 0;   // and those of them that COLMAP did not get.
-  };
-
   // colmap must outlive it.
   ScreenedVerifier(const GeometryOptions& options, CamerasOfImages cameras, ColmapVerifier& colmap);
 
@@ -37,14 +30,14 @@ class ScreenedVerifier : public GeometryVerifier {
   std::string AdviceOnFailure() const override { return colmap_.AdviceOnFailure(); }
 
   // Of all calls of Verify so far.
-  Statistics SoFar() const;
+  FitStatistics SoFar() const;
 
  private:
   GeometryOptions options_;
   CamerasOfImages cameras_;
   ColmapVerifier& colmap_;
   mutable std::mutex mutex_;
-  Statistics statistics_;
+  FitStatistics statistics_;
 };
 
 }  // namespace colmap_graphmatch
