@@ -88,12 +88,14 @@ PairListNames WritePairList(const std::filesystem::path& path, const RunDetails&
     return a.num_inliers > b.num_inliers;
   });
   std::vector<ImagePair> pairs;
+  pairs.reserve(edges.size());
   for (const VerifiedPair& edge : edges) pairs.push_back(edge.pair);
   return WriteList(path, details.images, pairs);
 }
 
 PairListNames WritePairList(const std::filesystem::path& path, const CandidateList& candidates) {
   std::vector<ImagePair> pairs;
+  pairs.reserve(candidates.pairs.size());
   for (const CandidatePair& candidate : candidates.pairs) pairs.push_back(candidate.pair);
   return WriteList(path, candidates.images, pairs);
 }
