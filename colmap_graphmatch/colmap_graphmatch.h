@@ -20,8 +20,9 @@ PipelineResult RunPipeline(const PipelineOptions& options, const StopRequest& st
 
 // Ranks the images and tests nothing: the pairs that the strategy would draw for each image if none
 // of them matched, but for those tested already. COLMAP is not run, and nothing is written to the
-// database. Throws the errors of base/errors.h; OptionsError for a strategy that does not rank
-// images.
+// database; DATABASE.graphmatch keeps the vectors for the next run. pair_log_path, keep_details and
+// budget have no effect. Throws the errors of base/errors.h; OptionsError for a strategy that does
+// not rank images, and for a replay_path.
 CandidateList FindCandidates(const PipelineOptions& options, const StopRequest& stop,
                              PipelineObserver& observer);
 

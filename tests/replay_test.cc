@@ -377,6 +377,7 @@ TEST_F(ReplayTest, AListIsCutAtItsEnd) {
 
 TEST_F(ReplayTest, CandidatesAreFoundWithoutATest) {
   const auto find = [this] { return FindCandidates(options_, StopRequest(), observer_); };
+  EXPECT_THAT(find, ThrowsMessage<OptionsError>(HasSubstr("leave replay_path empty")));
   options_.replay_path.clear();
   const CandidateList list = find();  // There is no COLMAP at options_.colmap_path.
   EXPECT_THAT(list.images, SizeIs(30));

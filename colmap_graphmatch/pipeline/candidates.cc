@@ -36,6 +36,11 @@ CandidateList FindCandidates(const PipelineOptions& options, const StopRequest& 
   if (!options.RanksImages()) {
     throw OptionsError("Only a strategy that ranks images has candidates.");
   }
+  if (!options.replay_path.empty()) {
+    throw OptionsError("Candidates are what a run would test, and a replay of " +
+                       options.replay_path.string() +
+                       " tests nothing: leave replay_path empty to find them.");
+  }
   const Stopwatch stopwatch;
   RunSetup setup(RunKind::kCandidates, options, stop, observer);
   setup.ReadLists();

@@ -132,6 +132,9 @@ PipelineResult Pipeline::Report() {
   if (options_.keep_details) result_.details = Details();
   result_.cost = verification_->Cost();
   verification_->Finish();
+  // Its end counts as part of the run: the work directory and the descriptor cache go before the
+  // log is closed and the time is taken.
+  verification_.reset();
   if (log_) log_->Close();
   result_.num_images = setup_.all_images.size();
   result_.num_images_without_features = setup_.all_images.size() - setup_.images.size();
@@ -151,6 +154,8 @@ std::unique_ptr<PairProposer> Pipeline::MakeProposer() {
 
 KnownPairsPolicy Pipeline::ChooseKnown() {
   KnownPairsPolicy known;
+  // A replay knows no pair beforehand, and its checkpoint keeps nothing.
+  if (setup_.kind == RunKind::kReplay) return known;
   if (!options_.RanksImages() || !IsLoop(options_.strategy)) return known;
   GraphMatchOptions graph = LoopOptionsOf(options_);
   graph.restrictions = restrictions_;

@@ -11,15 +11,16 @@
 
 namespace colmap_graphmatch {
 
-RunSetup::RunSetup(RunKind kind, const PipelineOptions& run_options, const StopRequest& run_stop,
-                   PipelineObserver& observer)
-    : options(run_options),
+RunSetup::RunSetup(RunKind run_kind, const PipelineOptions& run_options,
+                   const StopRequest& run_stop, PipelineObserver& observer)
+    : kind(run_kind),
+      options(run_options),
       stop(run_stop),
       messages{[&observer](const std::string& message) { observer.OnInfo(message); },
                [&observer](const std::string& warning) { observer.OnWarning(warning); }},
       threads(run_options.num_threads) {
   WarnOfFewThreads();
-  Open(kind);
+  Open();
   WarnOfFewImages();
 }
 
@@ -32,7 +33,7 @@ void RunSetup::WarnOfFewThreads() const {
                 "what it gets, and is slower.");
 }
 
-void RunSetup::Open(RunKind kind) {
+void RunSetup::Open() {
   const bool writes = kind == RunKind::kMatch;
   database.emplace(options.database_path,
                    writes ? sqlite::Access::kReadWrite : sqlite::Access::kRead, Patience());

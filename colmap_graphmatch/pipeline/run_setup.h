@@ -29,7 +29,7 @@ class RunSetup {
  public:
   // Warns of what the run has to do without. What is passed by reference must outlive it. Throws
   // the errors of base/errors.h.
-  RunSetup(RunKind kind, const PipelineOptions& run_options, const StopRequest& run_stop,
+  RunSetup(RunKind run_kind, const PipelineOptions& run_options, const StopRequest& run_stop,
            PipelineObserver& observer);
 
   // Reads match_list_path and image_list_path.
@@ -43,6 +43,7 @@ class RunSetup {
 
   sqlite::LockPatience Patience() const;
 
+  const RunKind kind;
   const PipelineOptions& options;
   const StopRequest& stop;
   const Messages messages;  // To the observer.
@@ -56,7 +57,7 @@ class RunSetup {
   std::vector<ImageId> query_images;           // Of image_list_path; ascending.
 
  private:
-  void Open(RunKind kind);
+  void Open();
   void WarnOfFewThreads() const;
   void WarnOfFewImages() const;
 };

@@ -128,7 +128,13 @@ std::unique_ptr<RunVerification> MakeReplay(RunSetup& setup) {
 }  // namespace
 
 std::unique_ptr<RunVerification> MakeRunVerification(RunSetup& setup) {
-  if (!setup.options.replay_path.empty()) return MakeReplay(setup);
+  switch (setup.kind) {
+    case RunKind::kReplay:
+      return MakeReplay(setup);
+    case RunKind::kMatch:
+    case RunKind::kCandidates:
+      break;
+  }
   return std::make_unique<ByMatching>(setup);
 }
 

@@ -11,15 +11,15 @@
 namespace colmap_graphmatch {
 
 // What answers the pairs of a run, with all that it needs for that: matching and geometric
-// verification, or a finished matching graph that is replayed. A new way to verify pairs is another
-// one of these.
+// verification, or a finished matching graph that is replayed. A new way to verify pairs is usually
+// a GeometryVerifier that ChosenVerifier chooses, not another one of these.
 class RunVerification {
  public:
   virtual ~RunVerification() = default;
 
   virtual PairVerifier& Verifier() = 0;
 
-  // Instead of the time that it took, where it would have taken longer.
+  // Of a replay: the modelled time so far.
   virtual std::optional<double> ModelledSeconds() const { return std::nullopt; }
 
   virtual std::variant<VerificationCost, ReplayCost> Cost() const = 0;
@@ -28,7 +28,8 @@ class RunVerification {
   virtual void Finish() {}
 };
 
-// As options.replay_path says. setup must outlive it. Throws the errors of base/errors.h.
+// What the kind of the run asks for, which is not kCandidates. setup must outlive it. Throws the
+// errors of base/errors.h.
 std::unique_ptr<RunVerification> MakeRunVerification(RunSetup& setup);
 
 }  // namespace colmap_graphmatch

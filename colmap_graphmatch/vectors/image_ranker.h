@@ -32,9 +32,8 @@ struct RankedImages {
   std::unique_ptr<Ranking> ranking;  // and their ranking: a vertex each.
 };
 
-// From the features to ranked lists, in three steps: the pre-processing of the paper. What an
-// earlier run kept is used, and kept for the next. A step that the options make needless, as where
-// vectors or ranked lists are given, does nothing.
+// From the features to ranked lists: the pre-processing of the paper. Learn, Encode, Rank: in this
+// order, each once. What an earlier run kept is used, and kept for the next.
 class ImageRanker {
  public:
   // images: all with features, and their fingerprints. seed: of everything random. All that is
@@ -45,11 +44,13 @@ class ImageRanker {
               ThreadPool& threads, const StopRequest& stop, const Messages& messages);
 
   // What images are described with. known: the pairs that are in the database, of which a warning
-  // may speak.
+  // may speak. Nothing where vectors or ranked lists are given.
   VectorModel Learn(const std::vector<VerifiedPair>& known);
 
+  // Reads the vectors where they are given; none where ranked lists are.
   ImageVectors Encode(const VectorModel& model);
 
+  // Reads the ranked lists where they are given, whatever the vectors.
   RankedImages Rank(ImageVectors vectors);
 
   // What the steps took.

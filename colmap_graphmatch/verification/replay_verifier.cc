@@ -26,6 +26,11 @@ void ReplayVerifier::SetCosts(std::unordered_map<ImageId, std::size_t> num_featu
   num_threads_ = num_threads;
 }
 
+const std::vector<VerifiedPair>& ReplayVerifier::KnownPairs() const {
+  static const std::vector<VerifiedPair> none;
+  return none;
+}
+
 VerifiedPair ReplayVerifier::Answer(const ImagePair& pair) const {
   const auto found = pairs_.find(pair);
   if (found == pairs_.end()) return {pair, PairOutcome::kNoEdge, 0};

@@ -46,7 +46,8 @@ class ReplayVerifier : public PairVerifier {
   // that is being reported.
   double ModelledSeconds() const { return modelled_seconds_; }
 
-  const std::vector<VerifiedPair>& KnownPairs() const override { return known_pairs_; }
+  // None: nothing was tested before a replay.
+  const std::vector<VerifiedPair>& KnownPairs() const override;
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override;
   const FeatureMatches& Inliers(const ImagePair& pair) override;
@@ -56,7 +57,6 @@ class ReplayVerifier : public PairVerifier {
   double Cost(const ImagePair& pair) const;
 
   std::unordered_map<ImagePair, ReplayedPair> pairs_;
-  std::vector<VerifiedPair> known_pairs_;  // None: nothing was tested before a replay.
   std::unordered_map<ImageId, std::size_t> num_features_;
   int num_threads_ = 1;
   std::function<FeatureMatches(const ImagePair&)> read_inliers_;
