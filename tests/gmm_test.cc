@@ -653,6 +653,13 @@ TEST(GmmOptionsTest, TheSeedAndEveryFieldChangeTheKey) {
   }
 }
 
+// With other words the mixtures of earlier runs would no longer be found.
+TEST(GmmOptionsTest, StateFilesHaveTheKeyInTheseWords) {
+  EXPECT_EQ(GmmOptions().Key(7),
+            "components 64, tolerance 0x1.4f8b588e368f1p-17, iterations 100, variance floor "
+            "0x1.a36e2eb1c432dp-14, seed 7");
+}
+
 TEST(GmmOptionsTest, NoSamplesAreRefused) {
   EXPECT_THROW(Train(GmmOptions(), RowMatrixXf(0, 128)), OptionsError);
 }

@@ -169,6 +169,18 @@ TEST(Options, EveryFieldChangesTheKey) {
   }
 }
 
+// With other words the seeds of earlier runs would no longer be found.
+TEST(Options, StateFilesHaveTheKeyInTheseWords) {
+  EXPECT_EQ(PairRestrictions().Key(), "seeking 0 0, frames 0 0");
+  EXPECT_EQ(GraphMatchOptions().Key(),
+            "iterations 10, neighbors 120, propagated 4, tests 0, failed 0, "
+            "seeking 0 0, frames 0 0");
+  PairRestrictions restrictions;
+  restrictions.queries = {true, false};
+  restrictions.frames = {0, 7, 7};
+  EXPECT_EQ(restrictions.Key(), "seeking 2 1489118142, frames 3 3972528079");
+}
+
 TEST(Options, RejectsWhatCannotBe) {
   for (const auto& break_option : std::vector<void (*)(GraphMatchOptions*)>{
            [](GraphMatchOptions* o) { o->number_sample_iterations = -1; },

@@ -13,6 +13,7 @@
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/colmap_graphmatch.h"
 #include "colmap_graphmatch/files/pair_list.h"
+#include "colmap_graphmatch/pipeline/strategy.h"
 #include "colmap_graphmatch/vectors/checkpoint.h"
 #include "tests/support/synthetic_database.h"
 
@@ -154,9 +155,16 @@ TEST(ImageVectorOptions, TheSeedAndEveryFieldButThePathsChangeTheKey) {
   elsewhere.vectors_path = "vectors.npy";
   EXPECT_EQ(elsewhere.Key(0), ImageVectorOptions().Key(0));
   // State files have it in these words.
-  EXPECT_EQ(ImageVectorOptions().Key(7).rfind("descriptor 0, PCA 32, components 64, ", 0), 0U);
-  EXPECT_THAT(ImageVectorOptions().Key(7),
-              HasSubstr(", seed 7, training 100000, features 1000, seed 7"));
+  EXPECT_EQ(ImageVectorOptions().Key(7),
+            "descriptor 0, PCA 32, components 64, tolerance 0x1.4f8b588e368f1p-17, iterations 100, "
+            "variance floor 0x1.a36e2eb1c432dp-14, seed 7, training 100000, features 1000, seed 7");
+}
+
+// With other words the seeds of earlier runs would no longer be found.
+TEST(LoopKey, StateFilesHaveItInTheseWords) {
+  EXPECT_EQ(LoopKey(PipelineOptions(), PairRestrictions()),
+            "loop: iterations 10, neighbors 120, propagated 4, tests 0, failed 0, seeking 0 0, "
+            "frames 0 0, inliers 15");
 }
 
 TEST(Checkpoint, OneOfNothingKeepsNothing) {
