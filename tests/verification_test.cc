@@ -24,6 +24,7 @@
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 #include "colmap_graphmatch/verification/fault_isolation.h"
+#include "colmap_graphmatch/verification/plan.h"
 #include "colmap_graphmatch/verification/shard_runner.h"
 #include "colmap_graphmatch/verification/subprocess.h"
 #include "colmap_graphmatch/verification/work_directory.h"

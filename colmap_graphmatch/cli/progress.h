@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "colmap_graphmatch/graph/explorer.h"
+#include "colmap_graphmatch/graph/exploration.h"
 
 namespace colmap_graphmatch {
 

@@ -5,7 +5,7 @@
 #include <variant>
 
 #include "colmap_graphmatch/cli/progress.h"
-#include "colmap_graphmatch/vectors/image_ranker.h"
+#include "colmap_graphmatch/vectors/options.h"
 
 namespace colmap_graphmatch {
 namespace {

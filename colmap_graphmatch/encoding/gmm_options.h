@@ -5,7 +5,7 @@
 
 namespace colmap_graphmatch {
 
-// Of the mixture of Gaussians (encoding/gmm.h).
+// Of the mixture of Gaussians, with diagonal covariances, that EM learns.
 struct GmmOptions {
   // K. More components describe finer differences and cost proportionally more time and memory: the
   // Fisher vector of an image has 2 K D entries. Paper: 16 ("We used 16 centroids") of D = 128.

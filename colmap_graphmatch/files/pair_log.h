@@ -8,7 +8,7 @@
 
 #include "colmap_graphmatch/base/output_file.h"
 #include "colmap_graphmatch/database/database.h"
-#include "colmap_graphmatch/graph/explorer.h"
+#include "colmap_graphmatch/graph/exploration.h"
 
 namespace colmap_graphmatch {
 

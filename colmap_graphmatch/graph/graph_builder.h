@@ -4,7 +4,7 @@
 
 #include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/graph/components.h"
-#include "colmap_graphmatch/graph/explorer.h"
+#include "colmap_graphmatch/graph/exploration.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
 #include "colmap_graphmatch/graph/pair_proposer.h"
 

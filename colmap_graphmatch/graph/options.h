@@ -29,7 +29,8 @@ struct GraphMatchOptions {
   // 1.2 % of the edges where it was tried (docs/evaluation.md).
   int max_failed_samples = 0;
 
-  // Images that are no queries neither draw tests nor are propagated from.
+  // Images that are no queries neither draw tests nor are propagated from. RunPipeline sets these
+  // itself.
   PairRestrictions restrictions;
 
   // The number of tests that the formula or max_tests_for_sampling gives for N images.

@@ -5,8 +5,8 @@
 
 namespace colmap_graphmatch {
 
-// Who proposed a pair. kSampling, kPropagation: the paper's loop (graphmatch.h). kListed: the pairs
-// were given beforehand (listed_pairs.h). kRetrieval, kExpansion: see retrieval.h.
+// Who proposed a pair. kSampling, kPropagation: the paper's loop. kListed: the pairs were given
+// beforehand, or are all. kRetrieval: the ranking, kExpansion: query expansion after it.
 enum class LoopStage { kSampling, kPropagation, kListed, kRetrieval, kExpansion };
 inline constexpr std::array<LoopStage, 5> kLoopStages = {
     LoopStage::kSampling, LoopStage::kPropagation, LoopStage::kListed, LoopStage::kRetrieval,

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "colmap_graphmatch/base/errors.h"
-
 namespace colmap_graphmatch {
 namespace {
 

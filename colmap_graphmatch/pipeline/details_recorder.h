@@ -5,7 +5,7 @@
 
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/base/verified_pair.h"
-#include "colmap_graphmatch/graph/explorer.h"
+#include "colmap_graphmatch/graph/exploration.h"
 #include "colmap_graphmatch/pipeline/result.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 

@@ -9,6 +9,7 @@
 #include "colmap_graphmatch/base/timed.h"
 #include "colmap_graphmatch/colmap_graphmatch.h"
 #include "colmap_graphmatch/files/pair_log.h"
+#include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/listed_pairs.h"
 #include "colmap_graphmatch/pipeline/budgeted_verifier.h"

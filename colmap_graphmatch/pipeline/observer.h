@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "colmap_graphmatch/graph/explorer.h"
+#include "colmap_graphmatch/graph/exploration.h"
 
 namespace colmap_graphmatch {
 

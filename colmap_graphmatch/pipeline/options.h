@@ -28,16 +28,16 @@ struct PipelineOptions {
 
   // Which pairs are tested. kGraphMatch: those that the loop finds. kSampling: the loop without
   // propagation. kPropagation: the loop with its first sampling alone. kRetrieval: the nearest
-  // images of each. kBriad: the same and then num_expansions rounds of query expansion
-  // (graph/retrieval.h). kExhaustive: all.
+  // images of each. kBriad: the same and then num_expansions rounds of query expansion.
+  // kExhaustive: all.
   enum class Strategy { kGraphMatch, kSampling, kPropagation, kRetrieval, kBriad, kExhaustive };
   Strategy strategy = Strategy::kGraphMatch;
 
-  // Tests the pairs of this list (see files/pair_list.h) instead, unless it is empty.
+  // Tests the pairs of this list (docs/formats.md) instead, unless it is empty.
   std::filesystem::path match_list_path;
 
-  // Only the images of this list (see files/pair_list.h) look for partners, among all images,
-  // unless it is empty: pairs of two others are not tested.
+  // Only the images of this list (docs/formats.md) look for partners, among all images, unless
+  // it is empty: pairs of two others are not tested.
   std::filesystem::path image_list_path;
 
   // Leaves out pairs of images of one frame: what the cameras of a rig took at the same time.
@@ -52,10 +52,14 @@ struct PipelineOptions {
   // Cores to use at a time, COLMAP's included; -1: all.
   int num_threads = -1;
 
-  // Of everything random. The same seed, input and options give the same tested pairs.
+  // Of everything random in this library. The same seed, input and options give the same tested
+  // pairs. COLMAP's own seed is verification.colmap_options["default_random_seed"].
   std::uint64_t seed = 0;
 
   ImageRankingOptions ranking;
+
+  // graph.restrictions has no effect: a run makes its own from image_list_path and
+  // skip_image_pairs_in_same_frame.
   GraphMatchOptions graph;
 
   // Images that kRetrieval and kBriad retrieve for each; 0: 120, for kBriad 40, as in the paper.
@@ -70,12 +74,12 @@ struct PipelineOptions {
   // tested pair.
   bool keep_details = false;
 
-  // Answers pairs from this finished matching graph (see files/finished_graph.h) instead of having
-  // COLMAP verify them, unless it is empty. Nothing is written to the database, and what it knows
-  // of pairs is not used.
+  // Answers pairs from this finished matching graph (docs/formats.md) instead of having COLMAP
+  // verify them, unless it is empty. Nothing is written to the database, and what it knows of pairs
+  // is not used.
   std::filesystem::path replay_path;
 
-  // Writes every tested pair to this CSV file (see files/pair_log.h), unless it is empty.
+  // Writes every tested pair to this CSV file (docs/formats.md), unless it is empty.
   std::filesystem::path pair_log_path;
 
   // Whether images are ranked: not where all pairs are tested, or those of a list.

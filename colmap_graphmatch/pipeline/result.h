@@ -3,14 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <variant>
 #include <vector>
 
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/base/verified_pair.h"
-#include "colmap_graphmatch/graph/explorer.h"
-#include "colmap_graphmatch/vectors/options.h"
+#include "colmap_graphmatch/graph/exploration.h"
+#include "colmap_graphmatch/vectors/ranking_seconds.h"
 
 namespace colmap_graphmatch {
 

@@ -11,6 +11,7 @@
 #include "colmap_graphmatch/verification/batch_verifier.h"
 #include "colmap_graphmatch/verification/chosen_verifier.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
+#include "colmap_graphmatch/verification/plan.h"
 #include "colmap_graphmatch/verification/replay_verifier.h"
 #include "colmap_graphmatch/verification/work_directory.h"
 

@@ -1,11 +1,9 @@
 #include "colmap_graphmatch/vectors/checkpoint.h"
 
-#include <algorithm>
 #include <boost/crc.hpp>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/base/stopwatch.h"
 
 namespace colmap_graphmatch {
 namespace {

@@ -76,20 +76,6 @@ std::string ChecksumOfPhotos(const std::filesystem::path& directory,
 
 }  // namespace
 
-const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor) {
-  switch (descriptor) {
-    case ImageVectorOptions::Descriptor::kFisher:
-      return "Fisher vectors";
-    case ImageVectorOptions::Descriptor::kVlad:
-      return "VLAD";
-    case ImageVectorOptions::Descriptor::kGist:
-      return "GIST";
-    case ImageVectorOptions::Descriptor::kFile:
-      break;
-  }
-  return "vectors";
-}
-
 ImageRanker::ImageRanker(const ImageRankingOptions& options, std::uint64_t seed, Database& database,
                          const std::vector<ImageRecord>& images,
                          const std::vector<ImageFingerprint>& fingerprints, Checkpoint& checkpoint,

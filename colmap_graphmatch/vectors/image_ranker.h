@@ -13,12 +13,10 @@
 #include "colmap_graphmatch/ranking/ranking.h"
 #include "colmap_graphmatch/vectors/checkpoint.h"
 #include "colmap_graphmatch/vectors/options.h"
+#include "colmap_graphmatch/vectors/ranking_seconds.h"
 #include "colmap_graphmatch/vectors/vector_model.h"
 
 namespace colmap_graphmatch {
-
-// For messages, e.g. "Fisher vectors".
-const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor);
 
 // The images that have a vector, ascending by id, and a row of dim floats for each.
 struct ImageVectors {

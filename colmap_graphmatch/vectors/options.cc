@@ -5,6 +5,20 @@
 
 namespace colmap_graphmatch {
 
+const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor) {
+  switch (descriptor) {
+    case ImageVectorOptions::Descriptor::kFisher:
+      return "Fisher vectors";
+    case ImageVectorOptions::Descriptor::kVlad:
+      return "VLAD";
+    case ImageVectorOptions::Descriptor::kGist:
+      return "GIST";
+    case ImageVectorOptions::Descriptor::kFile:
+      break;
+  }
+  return "vectors";
+}
+
 void ImageVectorOptions::Check() const {
   gmm.Check();
   if (pca_dim < 0 || pca_dim > kDescriptorDim) {

@@ -10,16 +10,16 @@
 namespace colmap_graphmatch {
 
 struct ImageVectorOptions {
-  // kFisher: Fisher vectors of SIFT features (encoding/fisher_vector.h). For comparison kVlad: VLAD
-  // under the same mixture (encoding/vlad.h), kGist: GIST of the photos (encoding/gist.h), kFile:
-  // vectors that another program made (files/given_vectors.h).
+  // kFisher: Fisher vectors of SIFT features. For comparison kVlad: VLAD under the same mixture,
+  // kGist: GIST of the photos, kFile: vectors that another program made.
   enum class Descriptor { kFisher, kVlad, kGist, kFile };
   Descriptor descriptor = Descriptor::kFisher;
 
   // Where the photos are, for kGist.
   std::filesystem::path image_path;
 
-  // Where the vectors are, for kFile.
+  // Where the vectors are, for kFile: a NumPy file (.npy) of a row for each image, with the images'
+  // names in the file of the same name with .txt, one a line.
   std::filesystem::path vectors_path;
 
   // PCA of the features to so many dimensions before the mixture, at most 128; 0: none. The paper
@@ -50,27 +50,21 @@ inline constexpr EnumWords<ImageVectorOptions::Descriptor, 4> kDescriptorWords =
      {ImageVectorOptions::Descriptor::kGist, "gist"},
      {ImageVectorOptions::Descriptor::kFile, "file"}}};
 
+// For messages, e.g. "Fisher vectors".
+const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor);
+
 struct ImageRankingOptions {
   ImageVectorOptions vectors;
 
-  // Writes the vectors that are made to this file (encoding/numpy_file.h), unless it is empty.
+  // Writes the vectors that are made to this file, which vectors_path can name, unless it is empty.
   std::filesystem::path export_path;
 
-  // Takes the ranked lists from this file (files/ranked_lists.h) instead of making vectors, unless
-  // it is empty.
+  // Takes the ranked lists from this file (docs/formats.md) instead of making vectors, unless it
+  // is empty.
   std::filesystem::path ranking_path;
 
   // Throws OptionsError.
   void Check() const;
-};
-
-// What the steps of ranking took; 0 for one that there was no need of.
-struct ImageRankingSeconds {
-  double mixture = 0;
-  double vectors = 0;
-  double ranking = 0;
-
-  double Sum() const { return mixture + vectors + ranking; }
 };
 
 }  // namespace colmap_graphmatch

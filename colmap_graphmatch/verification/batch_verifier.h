@@ -17,6 +17,7 @@
 #include "colmap_graphmatch/verification/exact_matcher.h"
 #include "colmap_graphmatch/verification/geometry_verifier.h"
 #include "colmap_graphmatch/verification/options.h"
+#include "colmap_graphmatch/verification/plan.h"
 #include "colmap_graphmatch/verification/shard_runner.h"
 
 namespace colmap_graphmatch {

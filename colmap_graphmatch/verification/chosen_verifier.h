@@ -11,6 +11,7 @@
 #include "colmap_graphmatch/verification/colmap_verifier.h"
 #include "colmap_graphmatch/verification/native_verifier.h"
 #include "colmap_graphmatch/verification/options.h"
+#include "colmap_graphmatch/verification/plan.h"
 #include "colmap_graphmatch/verification/screened_verifier.h"
 
 namespace colmap_graphmatch {

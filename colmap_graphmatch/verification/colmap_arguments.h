@@ -4,6 +4,7 @@
 #include <string>
 
 #include "colmap_graphmatch/verification/options.h"
+#include "colmap_graphmatch/verification/plan.h"
 
 namespace colmap_graphmatch {
 

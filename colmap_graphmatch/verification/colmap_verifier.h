@@ -13,6 +13,7 @@
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/geometry_verifier.h"
 #include "colmap_graphmatch/verification/options.h"
+#include "colmap_graphmatch/verification/plan.h"
 
 namespace colmap_graphmatch {
 

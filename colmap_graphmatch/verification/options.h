@@ -9,8 +9,6 @@
 
 namespace colmap_graphmatch {
 
-struct ColmapInstallation;
-
 // Of matching by this library.
 struct ExactMatcherOptions {
   DescriptorMatchingOptions matching;
@@ -30,16 +28,16 @@ struct VerificationOptions {
   Matcher matcher = Matcher::kAuto;
 
   // Who decides whether a pair is an edge. kColmap: COLMAP alone. kScreened: the same, but a fast
-  // fit goes first (screened_verifier.h). kNative: this library (native_verifier.h). Where COLMAP
-  // matches, it also verifies.
+  // fit goes first and settles hopeless pairs. kNative: this library. Where COLMAP matches, it
+  // also verifies.
   enum class Verifier { kScreened, kColmap, kNative };
   Verifier verifier = Verifier::kColmap;
 
   ExactMatcherOptions exact;
 
-  // COLMAP processes at a time, which share the run's threads. 0: one of one thread each without a
-  // GPU, and one process with it (docs/design.md). Descriptors are matched by one thread for each
-  // process, when that process does not run.
+  // COLMAP processes at a time. 0: as many as threads, of one thread each, without a GPU; one with
+  // it. Each gets threads / num_processes, at least 1. Descriptors are matched by one thread for
+  // each process, when that process does not run.
   int num_processes = 0;
 
   // Whether COLMAP matches on the GPU; without effect on a COLMAP that was built without.
@@ -60,7 +58,8 @@ struct VerificationOptions {
   // hanging, too.
   double timeout_per_pair = 60;
 
-  // Seconds to wait for locks of other processes on the user's database.
+  // Seconds to wait for locks of other processes on the user's database, on its state file and on a
+  // replayed database.
   double lock_timeout = 60;
 
   // Throws OptionsError.
@@ -76,19 +75,5 @@ inline constexpr EnumWords<VerificationOptions::Verifier, 3> kVerifierWords = {
     {{VerificationOptions::Verifier::kScreened, "screened"},
      {VerificationOptions::Verifier::kColmap, "colmap"},
      {VerificationOptions::Verifier::kNative, "native"}}};
-
-// What the options come to with the COLMAP that is installed.
-struct VerificationPlan {
-  bool matches_here = true;  // Descriptors, by this library.
-  bool uses_gpu = false;     // COLMAP does.
-  VerificationOptions::Verifier verifier = VerificationOptions::Verifier::kColmap;
-  int num_processes = 1;  // Of COLMAP, at a time,
-  int threads_per_process = 1;
-};
-
-// num_threads: the cores that all COLMAP processes together may use, at least 1; -1: all. Throws
-// OptionsError.
-VerificationPlan PlanVerification(const VerificationOptions& options, int num_threads,
-                                  const ColmapInstallation& colmap);
 
 }  // namespace colmap_graphmatch

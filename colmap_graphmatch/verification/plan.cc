@@ -1,0 +1,31 @@
+#include "colmap_graphmatch/verification/plan.h"
+
+#include <algorithm>
+
+#include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/verification/in_process.h"
+
+namespace colmap_graphmatch {
+
+VerificationPlan PlanVerification(const VerificationOptions& options, int num_threads,
+                                  const ColmapInstallation& colmap) {
+  options.Check();
+  using Matcher = VerificationOptions::Matcher;
+  using Verifier = VerificationOptions::Verifier;
+  const bool gpu = options.use_gpu && colmap.has_gpu;
+  VerificationPlan plan;
+  plan.matches_here =
+      options.matcher == Matcher::kExact || (options.matcher == Matcher::kAuto && !gpu);
+  if (options.verifier == Verifier::kNative) plan.matches_here = true;
+  plan.uses_gpu = gpu && !plan.matches_here;
+  const bool in_process = plan.matches_here && !NeedsColmap(options.geometry);
+  plan.verifier = in_process ? options.verifier : Verifier::kColmap;
+  num_threads = EffectiveNumThreads(num_threads);
+  plan.num_processes = options.num_processes > 0 ? options.num_processes
+                       : plan.uses_gpu           ? 1
+                                                 : num_threads;
+  plan.threads_per_process = std::max(1, num_threads / plan.num_processes);
+  return plan;
+}
+
+}  // namespace colmap_graphmatch
