@@ -288,7 +288,7 @@ void Table::AddEvaluation() {
       "read it; in a dry run the candidates, nearest first");
   Add("GraphMatching.export_graph", TextOf(&line_->graph_path, "the path of a file"),
       "write the matching graph as GraphML, or for Graphviz (.dot)");
-  Add("GraphMatching.test_log", TextOf(&p.pair_log_path, "the path of a file"),
+  Add("GraphMatching.pair_log", TextOf(&p.pair_log_path, "the path of a file"),
       "a CSV file to write with every pair that is tested");
   Add("GraphMatching.replay_path",
       TextOf(&p.replay_path, "the path of a matched COLMAP database or a list of edges"),

@@ -150,7 +150,7 @@ class Parser {
         (!line_->report_path.empty() || !graph.empty() || !p.pair_log_path.empty())) {
       throw OptionsError(
           "With --GraphMatching.dry_run nothing is tested: there is nothing for "
-          "--GraphMatching.report, --GraphMatching.export_graph or --GraphMatching.test_log to "
+          "--GraphMatching.report, --GraphMatching.export_graph or --GraphMatching.pair_log to "
           "tell. --GraphMatching.export_pairs writes the candidates.");
     }
     const auto& photos = p.ranking.vectors.image_path;

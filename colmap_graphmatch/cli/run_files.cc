@@ -83,7 +83,7 @@ std::vector<RunFile> FilesOfRun(const CommandLine& line) {
   const auto grows = [&files](const char* option, const std::filesystem::path& path) {
     if (!path.empty()) files.push_back({option, path, RunFile::Use::kGrows});
   };
-  grows("--GraphMatching.test_log", p.pair_log_path);
+  grows("--GraphMatching.pair_log", p.pair_log_path);
   grows("--log_path", line.log.FilePath());
   return files;
 }

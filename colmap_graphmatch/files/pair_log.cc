@@ -38,7 +38,7 @@ void PairLog::Write(const LoopProgress& progress, double seconds) {
 void PairLog::Close() {
   file_.flush();
   if (file_.Error() == 0) return;
-  throw FileError("Cannot write the log of tests " + path_.string() + ": " +
+  throw FileError("Cannot write the log of pairs " + path_.string() + ": " +
                   std::strerror(file_.Error()) + ".");
 }
 

@@ -144,7 +144,7 @@ class Matcher:
         report = self.directory / f"{name}.report.json"
         command = [self.program, "--database_path", str(self.features),
                    "--GraphMatching.replay_path", str(self.truth),
-                   "--GraphMatching.test_log", str(log), "--GraphMatching.report", str(report),
+                   "--GraphMatching.pair_log", str(log), "--GraphMatching.report", str(report),
                    *self.common, *arguments]
         step = Step(self.directory / f"{name}.step.json",
                     stamp_of(command, Path(self.program), self.features_stamp, self.truth, *inputs))

@@ -687,7 +687,7 @@ piece='belong together' says 1 'Vectors of a file are asked for, and no file is 
 piece='give --image_path' says 1 'GIST without the photos' "${run[@]}" --GraphMatching.descriptor gist
 piece='Is --image_path' says 5 'A photo is missing, for GIST' "${run[@]}" \
   --GraphMatching.descriptor gist --image_path "$work"
-says 5 'The log of tests cannot be written' "${run[@]}" --GraphMatching.test_log "$work/none/log.csv"
+says 5 'The log of pairs cannot be written' "${run[@]}" --GraphMatching.pair_log "$work/none/log.csv"
 partial=yes says 5 'The report cannot be written' "${run[@]}" \
   --GraphMatching.report "$work/none/report.json"
 says 5 'The list of edges cannot be written' "${run[@]}" \

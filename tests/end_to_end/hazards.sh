@@ -96,9 +96,9 @@ for suffix in -wal -shm -journal .graphmatch .graphmatch-journal; do
   [[ ! -e database.db$suffix ]] || fail "database.db$suffix was made"
 done
 ln -s database.db link.db
-expect_exit 1 'are the same file' "$matcher" --database_path link.db --GraphMatching.test_log database.db-wal
+expect_exit 1 'are the same file' "$matcher" --database_path link.db --GraphMatching.pair_log database.db-wal
 cp database.db other.db
-for output in export_pairs report test_log; do
+for output in export_pairs report pair_log; do
   keeps other.db 5 'it is a SQLite database' "${run[@]}" "--GraphMatching.$output" other.db
   expect_exit 5 'SQLite keeps there' "${run[@]}" "--GraphMatching.$output" other.db-wal
 done
@@ -112,12 +112,12 @@ ln -s elsewhere/pairs pairs
 mkfifo pipe
 cat pipe >received &
 expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_pairs pairs --GraphMatching.export_graph graph.dot \
-  --GraphMatching.report /dev/null --GraphMatching.test_log pipe
+  --GraphMatching.report /dev/null --GraphMatching.pair_log pipe
 wait
 [[ -L pairs && -p pipe && -c /dev/null ]] || fail 'a link, a pipe or a device was replaced'
 [[ $(head -n 1 received) == test,* && $(wc -l <elsewhere/pairs) -gt 10 ]] || fail 'not what was to be written'
 expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_pairs /dev/stdout
-"${run[@]}" --GraphMatching.test_log /dev/stdout --GraphMatching.export_pairs /dev/stdout --GraphMatching.max_pairs 5 \
+"${run[@]}" --GraphMatching.pair_log /dev/stdout --GraphMatching.export_pairs /dev/stdout --GraphMatching.max_pairs 5 \
   --GraphMatching.strategy exhaustive >both 2>"$work/output.txt"
 "${run[@]}" --GraphMatching.export_pairs /dev/stdout >>both 2>"$work/output.txt" || fail 'a file as the standard output'
 [[ $(head -n 1 both) == test,* && $(grep -c '^Images ' both) == 2 ]] || fail 'what was printed was written over'
@@ -297,7 +297,7 @@ wait "$pid" || code=$?
 fresh big
 mkfifo pipe
 exec 4<>pipe
-"${run[@]}" --GraphMatching.test_log pipe --GraphMatching.export_pairs pipe --GraphMatching.export_graph graph.dot \
+"${run[@]}" --GraphMatching.pair_log pipe --GraphMatching.export_pairs pipe --GraphMatching.export_graph graph.dot \
   --GraphMatching.report pipe >"$work/output.txt" 2>&1 &
 pid=$!
 wait_for grep -q 'Time   ' "$work/output.txt"
