@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
@@ -624,6 +625,21 @@ TEST(Subprocess, ReportsHowItEnded) {
     return state != "Z" && state != "X";
   };
   while (lives()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+}
+
+// Signals are blocked while a program is started, but not in it; what we ignore it does not.
+TEST(Subprocess, SignalsAreThoseOfAFreshProgram) {
+  const TestDirectory directory;
+  const auto before = std::signal(SIGPIPE, SIG_IGN);
+  const auto before_user = std::signal(SIGUSR1, [](int) {});
+  EXPECT_TRUE(RunSubprocess({"/bin/sed", "-n", "/^Sig[BIC]/p", "/proc/self/status"},
+                            directory.Path() / "out.txt", 0, Never)
+                  .Succeeded());
+  const std::string none = "\t0000000000000000";
+  EXPECT_EQ(LastLines(directory.Path() / "out.txt", 9),
+            "SigBlk:" + none + "\nSigIgn:" + none + "\nSigCgt:" + none);
+  std::signal(SIGPIPE, before);
+  std::signal(SIGUSR1, before_user);
 }
 
 TEST(Subprocess, CanBeStopped) {

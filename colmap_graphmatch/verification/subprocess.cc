@@ -5,8 +5,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+// Boost.Process has its vfork only where this is said.
+#define BOOST_POSIX_HAS_VFORK 1
 #include <boost/process.hpp>
 #include <boost/process/extend.hpp>
+#include <boost/process/posix.hpp>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -63,6 +66,37 @@ void CheckCanStart(const std::filesystem::path& output_path) {
   }
 }
 
+// No signal is handled in this thread while it is there.
+class BlockedSignals {
+ public:
+  BlockedSignals() {
+    ::sigfillset(&all_);
+    ::pthread_sigmask(SIG_SETMASK, &all_, &before_);
+  }
+  ~BlockedSignals() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  BlockedSignals(const BlockedSignals&) = delete;
+  BlockedSignals& operator=(const BlockedSignals&) = delete;
+
+  // In a child that shares our memory until exec: what handles signals here must not run there.
+  void UnblockInChild() const {
+    for (int signal = 1; signal < NSIG; ++signal) {
+      struct sigaction action = {};
+      if (::sigaction(signal, nullptr, &action) != 0) continue;
+      if (action.sa_handler == SIG_IGN || action.sa_handler == SIG_DFL) continue;
+      ::signal(signal, SIG_DFL);
+    }
+    // Sent to the whole group, and meant for us.
+    const timespec at_once = {};
+    while (::sigtimedwait(&all_, nullptr, &at_once) > 0) {
+    }
+    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+
+ private:
+  sigset_t all_ = {};
+  sigset_t before_ = {};
+};
+
 std::string Rounded(double seconds) {
   std::string text = std::to_string(seconds);
   text.resize(text.find('.') + 2);
@@ -102,15 +136,18 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
   bp::group group;
   std::error_code error;
   const auto start = [&] {
+    const BlockedSignals signals;
+    // Not fork: to copy the tables of our memory takes as long as the start of COLMAP.
     return bp::child(
-        bp::exe = command.front(),
+        bp::posix::use_vfork, bp::exe = command.front(),
         bp::args = std::vector<std::string>(command.begin() + 1, command.end()), environment,
         bp::std_in<bp::null, (bp::std_out & bp::std_err)> output_path.string(), group, error,
-        bp::extend::on_exec_setup = [parent](auto&) {
+        bp::extend::on_exec_setup = [parent, &signals](auto&) {
           // What is ignored here would be ignored there.
           for (const int signal : {SIGPIPE, SIGXFSZ}) ::signal(signal, SIG_DFL);
           ::prctl(PR_SET_PDEATHSIG, SIGKILL);
           if (::getppid() != parent) ::_exit(1);
+          signals.UnblockInChild();
         });
   };
   bp::child child = start();
