@@ -28,6 +28,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Pair;
 using ::testing::SizeIs;
 
 constexpr double kLockTimeout = 0.2;
@@ -743,6 +744,62 @@ TEST_P(ShardTest, HoldsTheImagesOfItsPairs) {
   EXPECT_EQ(descriptors.CopyBlob(0), Open().ReadDescriptors(5).data);
 }
 
+TEST_P(ShardTest, HasTheFeaturesOfItsMatchesAlone) {
+  Write(GetParam().source);
+  const std::filesystem::path shard_path = directory_.Path() / "shard.db";
+  CreateColmapDatabase(shard_path, GetParam().target);
+  const FeatureMatches of_25 = {{3, 1}, {0, 5}};
+  const FeatureMatches of_35 = {{2, 5}};
+  const ShardFeatures features =
+      FillShard(shard_path, Path(), kLockTimeout,
+                {{ImagePair(2, 5), of_25}, {ImagePair(3, 5), of_35}}, false);
+  EXPECT_THAT(features, ElementsAre(Pair(2, ElementsAre(0, 3)), Pair(3, ElementsAre(2)),
+                                    Pair(5, ElementsAre(1, 5))));
+  {
+    Database shard(shard_path, sqlite::Access::kRead, 1);
+    Database source = Open();
+    for (const auto& [image, numbers] : features) {
+      const Keypoints all = source.ReadKeypoints({image, "", 10});
+      const Keypoints some = shard.ReadKeypoints({image, "", numbers.size()});
+      ASSERT_EQ(some.num_cols, all.num_cols);
+      for (std::size_t row = 0; row < numbers.size(); ++row) {
+        EXPECT_EQ(some.data[row * all.num_cols], all.data[numbers[row] * all.num_cols]);
+      }
+    }
+    EXPECT_THAT(shard.ReadMatches(ImagePair(2, 5)),
+                ElementsAre(FeatureMatch{1, 0}, FeatureMatch{0, 1}));
+  }
+  sqlite::Connection(shard_path, sqlite::Access::kReadWrite, 1)
+      .Execute(
+          "INSERT INTO two_view_geometries(pair_id, rows, cols, data, config) SELECT pair_id, "
+          "rows, cols, data, 3 FROM matches");
+  const std::vector<PairGeometry> results =
+      ReadShard(shard_path, {ImagePair(2, 5), ImagePair(3, 5)}, {}, features);
+  EXPECT_EQ(results[0].matches, of_25);
+  EXPECT_EQ(results[0].geometry.inliers, of_25);
+  EXPECT_EQ(results[1].geometry.inliers, of_35);
+}
+
+// COLMAP is to say what it thinks of them.
+TEST_P(ShardTest, KeypointsThatCannotBeAreCopiedAsTheyAre) {
+  Write(GetParam().source);
+  Execute("UPDATE keypoints SET rows = 3 WHERE image_id = 2");
+  Execute("UPDATE keypoints SET data = NULL WHERE image_id = 3");
+  const std::filesystem::path shard_path = directory_.Path() / "shard.db";
+  CreateColmapDatabase(shard_path, GetParam().target);
+  const ShardFeatures features = FillShard(
+      shard_path, Path(), kLockTimeout,
+      {{ImagePair(2, 5), FeatureMatches{{3, 1}}}, {ImagePair(3, 5), FeatureMatches{{0, 2}}}},
+      false);
+  EXPECT_THAT(features, ElementsAre(Pair(5, ElementsAre(1, 2))));
+  sqlite::Connection shard(shard_path, sqlite::Access::kRead, 1);
+  sqlite::Statement rows(shard, "SELECT rows, length(data) FROM keypoints ORDER BY image_id");
+  rows.Step();
+  EXPECT_EQ(rows.Int(0), 3);
+  rows.Step();
+  EXPECT_TRUE(rows.IsNull(1));
+}
+
 INSTANTIATE_TEST_SUITE_P(AcrossVersions, ShardTest,
                          ::testing::Values(SchemaPair{Schema::kColmap38, Schema::kColmap38},
                                            SchemaPair{Schema::kColmap38, Schema::kColmap42},
@@ -774,7 +831,7 @@ INSTANTIATE_TEST_SUITE_P(Shards, ShardMatches,
 class ShardResults : public DatabaseTest {
  protected:
   std::vector<PairGeometry> Read() const {
-    return ReadShard(Path(), {ImagePair(1, 2)}, {{1, 10}, {2, 10}});
+    return ReadShard(Path(), {ImagePair(1, 2)}, {{1, 10}, {2, 10}}, {});
   }
   void Result(const std::string& match_values, const std::string& geometry_values) const {
     const std::string id = std::to_string(EncodePair(ImagePair(1, 2)));

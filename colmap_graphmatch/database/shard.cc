@@ -60,9 +60,10 @@ void CheckCopiedMatches(sqlite::Connection& shard, const std::filesystem::path& 
 
 std::string ShardImageName(ImageId image_id) { return std::to_string(image_id); }
 
-void FillShard(const std::filesystem::path& shard_path, const std::filesystem::path& database_path,
-               const sqlite::LockPatience& patience, const std::vector<ShardPair>& pairs,
-               bool with_descriptors) {
+ShardFeatures FillShard(const std::filesystem::path& shard_path,
+                        const std::filesystem::path& database_path,
+                        const sqlite::LockPatience& patience, const std::vector<ShardPair>& pairs,
+                        bool with_descriptors) {
   sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, patience);
   shard.AttachReadOnly(database_path, "source");
   // A shard is thrown away when anything goes wrong: it need not survive a crash.
@@ -82,7 +83,17 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
   shard.Execute(CopyTable(shard, "cameras", {}) +
                 " WHERE camera_id IN (SELECT camera_id FROM source.images" + of_images + ")");
   shard.Execute(CopyTable(shard, "images", {{"name", "CAST(image_id AS TEXT)"}}) + of_images);
-  shard.Execute(CopyTable(shard, "keypoints", {}) + of_images);
+  const bool brings_matches =
+      !with_descriptors && std::all_of(pairs.begin(), pairs.end(), [](const ShardPair& pair) {
+        return pair.matches.has_value();
+      });
+  ShardFeatures features;
+  if (brings_matches) {
+    features = FeaturesOf(pairs);
+    CopyKeypoints(shard, &features);
+  } else {
+    shard.Execute(CopyTable(shard, "keypoints", {}) + of_images);
+  }
   if (with_descriptors) {
     const std::vector<std::string> source_columns = shard.Columns("descriptors", "source");
     const bool typed =
@@ -93,17 +104,20 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
                                   : std::map<std::string, std::string>{{"type", "0"}}) +
                   of_images);
   }
-  shard.Execute(CopyTable(shard, "matches", {}) +
-                " WHERE pair_id IN (SELECT pair_id FROM pair_ids) AND pair_id NOT IN "
-                "(SELECT pair_id FROM source.two_view_geometries)");
-  CheckCopiedMatches(shard, database_path);
+  if (!brings_matches) {
+    shard.Execute(CopyTable(shard, "matches", {}) +
+                  " WHERE pair_id IN (SELECT pair_id FROM pair_ids) AND pair_id NOT IN "
+                  "(SELECT pair_id FROM source.two_view_geometries)");
+    CheckCopiedMatches(shard, database_path);
+  }
   sqlite::Statement add_matches(
       shard,
       "INSERT OR REPLACE INTO main.matches(pair_id, rows, cols, data) VALUES(?1, ?2, ?3, ?4)");
   for (const auto& [pair, matches] : pairs) {
     if (!matches) continue;
     add_matches.Bind(1, static_cast<std::int64_t>(EncodePair(pair)));
-    BindMatches(*matches, 2, &add_matches);
+    const FeatureMatches of_shard = ToShard(pair, *matches, features);  // Bound, not copied.
+    BindMatches(of_shard, 2, &add_matches);
     add_matches.Run();
   }
   if (!with_descriptors) {
@@ -118,11 +132,17 @@ void FillShard(const std::filesystem::path& shard_path, const std::filesystem::p
     }
   }
   transaction.Commit();
+  return features;
 }
 
 std::vector<PairGeometry> ReadShard(const std::filesystem::path& shard_path,
                                     const std::vector<ImagePair>& pairs,
-                                    const std::map<ImageId, std::size_t>& num_features) {
+                                    const std::map<ImageId, std::size_t>& num_features,
+                                    const ShardFeatures& features) {
+  const auto num_features_of = [&](ImageId image) {
+    const auto listed = features.find(image);
+    return listed == features.end() ? num_features.at(image) : listed->second.size();
+  };
   sqlite::Connection shard(shard_path, sqlite::Access::kReadWrite, 0);
   const TwoViewGeometryCodec codec(shard.Columns("two_view_geometries"), false);
   sqlite::Statement select_matches(shard,
@@ -140,10 +160,11 @@ std::vector<PairGeometry> ReadShard(const std::filesystem::path& shard_path,
       if (!select_matches.Bind(1, pair_id).Step() || !select_geometry.Bind(1, pair_id).Step()) {
         throw DatabaseError("no result");
       }
-      const std::size_t num1 = num_features.at(pair.id1);
-      const std::size_t num2 = num_features.at(pair.id2);
-      result.matches = DecodeMatches(select_matches, 0, num1, num2);
+      const std::size_t num1 = num_features_of(pair.id1);
+      const std::size_t num2 = num_features_of(pair.id2);
+      result.matches = FromShard(pair, DecodeMatches(select_matches, 0, num1, num2), features);
       result.geometry = codec.Decode(select_geometry, 0, num1, num2);
+      result.geometry.inliers = FromShard(pair, std::move(result.geometry.inliers), features);
     } catch (const DatabaseError& error) {
       throw DatabaseError("COLMAP wrote " + std::string(error.what()) + " for the pair of images " +
                           std::to_string(pair.id1) + " and " + std::to_string(pair.id2) + ".");

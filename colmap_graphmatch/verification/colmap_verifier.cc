@@ -30,6 +30,14 @@ constexpr char kMatcherType[] = "FeatureMatching.type";
 // undefined.
 constexpr std::pair<int, int> kFirstDegenerate(4, 2);
 
+// In the directory of a shard.
+std::filesystem::path ShardPath(const std::filesystem::path& directory) {
+  return directory / "database.db";
+}
+std::filesystem::path ListPath(const std::filesystem::path& directory) {
+  return directory / "pairs.txt";
+}
+
 }  // namespace
 
 ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const VerificationPlan& plan,
@@ -140,18 +148,18 @@ std::map<ImageId, std::size_t> ColmapVerifier::NumFeatures(
   return num_features;
 }
 
-std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& directory,
-                                                   const std::vector<PairToVerify>& pairs,
-                                                   Trials trials) const {
-  const std::filesystem::path shard_path = directory / "database.db";
-  const std::filesystem::path list_path = directory / "pairs.txt";
+ShardFeatures ColmapVerifier::MakeShard(const std::filesystem::path& directory,
+                                        const std::vector<PairToVerify>& pairs) const {
+  const std::filesystem::path shard_path = ShardPath(directory);
+  const std::filesystem::path list_path = ListPath(directory);
+  ShardFeatures features;
   try {
     std::filesystem::copy_file(template_path_, shard_path);
     std::vector<ShardPair> rows;
     rows.reserve(pairs.size());
     for (const PairToVerify& pair : pairs) rows.push_back({pair.pair, pair.matches});
-    FillShard(shard_path, database_path_, {options_.lock_timeout, &stop_}, rows,
-              shards_have_descriptors_);
+    features = FillShard(shard_path, database_path_, {options_.lock_timeout, &stop_}, rows,
+                         shards_have_descriptors_);
   } catch (const std::filesystem::filesystem_error& error) {
     ThrowIfUnusable(work_path_);
     throw FileError("Cannot make a shard in the working directory: " + std::string(error.what()) +
@@ -167,10 +175,19 @@ std::vector<std::string> ColmapVerifier::MakeShard(const std::filesystem::path& 
   list.close();
   if (!list) ThrowIfUnusable(work_path_);
   if (!list) throw FileError("Cannot write " + list_path.string() + ". Is the disk full?");
+  return features;
+}
 
-  std::vector<std::string> command = {
-      colmap_.executable.string(), "matches_importer", "--database_path", shard_path.string(),
-      "--match_list_path",         list_path.string(), "--match_type",    "pairs"};
+std::vector<std::string> ColmapVerifier::Command(const std::filesystem::path& directory,
+                                                 Trials trials) const {
+  std::vector<std::string> command = {colmap_.executable.string(),
+                                      "matches_importer",
+                                      "--database_path",
+                                      ShardPath(directory).string(),
+                                      "--match_list_path",
+                                      ListPath(directory).string(),
+                                      "--match_type",
+                                      "pairs"};
   const std::vector<std::string>& arguments =
       trials == Trials::kFew ? arguments_for_few_trials_ : arguments_;
   command.insert(command.end(), arguments.begin(), arguments.end());
@@ -181,8 +198,9 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<PairToVerify>& pairs, Tria
                                     const std::function<bool()>& should_stop) {
   const WorkDirectory directory(work_path_);
   const std::filesystem::path output_path = directory.Path() / "output.txt";
-  const SubprocessResult run = RunSubprocess(MakeShard(directory.Path(), pairs, trials),
-                                             output_path, Timeout(pairs.size()), should_stop);
+  const ShardFeatures features = MakeShard(directory.Path(), pairs);
+  const SubprocessResult run = RunSubprocess(Command(directory.Path(), trials), output_path,
+                                             Timeout(pairs.size()), should_stop);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     statistics_.seconds += run.seconds;
@@ -205,7 +223,7 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<PairToVerify>& pairs, Tria
       std::vector<ImagePair> asked;
       asked.reserve(pairs.size());
       for (const PairToVerify& pair : pairs) asked.push_back(pair.pair);
-      outcome.results = ReadShard(directory.Path() / "database.db", asked, NumFeatures(pairs));
+      outcome.results = ReadShard(ShardPath(directory.Path()), asked, NumFeatures(pairs), features);
     } catch (const DatabaseError& error) {
       outcome.problem = std::string("ended without an error, but: ") + error.what() + "\n" +
                         LastLines(output_path, kNumLastLines);

@@ -10,6 +10,7 @@
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/database/shard_features.h"
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/geometry_verifier.h"
 #include "colmap_graphmatch/verification/options.h"
@@ -56,9 +57,11 @@ class ColmapVerifier : public GeometryVerifier {
       const std::function<void(const std::string&)>& on_warning) const;
   std::vector<std::string> ArgumentsForFewTrials() const;
   void MakeTemplate() const;
-  // In the directory of the shard; the command that verifies it.
-  std::vector<std::string> MakeShard(const std::filesystem::path& directory,
-                                     const std::vector<PairToVerify>& pairs, Trials trials) const;
+  // In this directory, with a list of its pairs.
+  ShardFeatures MakeShard(const std::filesystem::path& directory,
+                          const std::vector<PairToVerify>& pairs) const;
+  // What verifies the shard in this directory.
+  std::vector<std::string> Command(const std::filesystem::path& directory, Trials trials) const;
   double Timeout(std::size_t num_pairs) const;
   std::map<ImageId, std::size_t> NumFeatures(const std::vector<PairToVerify>& pairs) const;
 

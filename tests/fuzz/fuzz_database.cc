@@ -90,7 +90,7 @@ class Fuzzer {
         }
         std::vector<ImagePair> asked;
         for (const ShardPair& pair : pairs) asked.push_back(pair.pair);
-        ReadShard(shard, asked, num_features);
+        ReadShard(shard, asked, num_features, {});
       });
     }
     PairGeometry result;
