@@ -248,12 +248,26 @@ TEST(TwoViews, AScreenKeepsTheInliersAndFewOthers) {
   const SyntheticViews views(SyntheticScene::kGeneral, 300, 1, 0.5, 4);
   const Camera camera = SyntheticCamera(true);
   const ScreenedTwoViews screened =
-      ScreenTwoViews({{1, 2}, camera, camera, views.pairs, {}}, TwoViewOptions(), 1.5);
+      ScreenTwoViews({{1, 2}, camera, camera, views.pairs, {}}, TwoViewOptions());
   EXPECT_GE(screened.num_inliers + 2, views.num_inliers);
+  ASSERT_EQ(screened.errors.size(), views.pairs.size());
   std::size_t num_true = 0;
-  for (const std::size_t i : screened.near) num_true += i < views.num_inliers ? 1 : 0;
+  std::size_t num_others = 0;
+  for (std::size_t i = 0; i < screened.errors.size(); ++i) {
+    if (screened.errors[i] <= 1.5) ++(i < views.num_inliers ? num_true : num_others);
+  }
   EXPECT_GE(num_true + 1, views.num_inliers);
-  EXPECT_LE(screened.near.size(), num_true + 25);
+  EXPECT_LE(num_others, 25U);
+}
+
+TEST(TwoViews, WhereThereIsNoModelEveryErrorIsInfinite) {
+  const Camera camera = SyntheticCamera(true);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<PointPair> nowhere(20, PointPair{nan, nan, 7, 7});
+  const ScreenedTwoViews screened =
+      ScreenTwoViews({{1, 2}, camera, camera, nowhere, {}}, TwoViewOptions());
+  EXPECT_EQ(screened.num_inliers, 0U);
+  EXPECT_THAT(screened.errors, Each(std::numeric_limits<double>::infinity()));
 }
 
 TEST(Watermark, MarksOfBothImagesAreOne) {

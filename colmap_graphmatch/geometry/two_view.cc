@@ -95,11 +95,7 @@ class Search {
                                                homography.inliers.size(), options_.min_num_inliers);
   }
 
-  // Of E: which matches are within a multiple of its max_error.
-  std::vector<std::size_t> EssentialInliers(double bound) const {
-    return FindInliers(ErrorKind::kEpipolar, *essential.model, normalized_,
-                       bound * essential_max_error_);
-  }
+  double EssentialMaxError() const { return essential_max_error_; }
   const std::vector<PointPair>& Normalized() const { return normalized_; }
 
   Fit fundamental;
@@ -214,30 +210,26 @@ TwoViewVerdict VerifyTwoViews(const TwoViews& views, const TwoViewOptions& optio
   return geometry;
 }
 
-ScreenedTwoViews ScreenTwoViews(const TwoViews& views, const TwoViewOptions& options,
-                                double bound) {
+ScreenedTwoViews ScreenTwoViews(const TwoViews& views, const TwoViewOptions& options) {
   ScreenedTwoViews screened;
   Search search(views, options);
   search.Run();
   screened.trials = search.trials;
-  std::vector<bool> is_near(views.matches.size(), false);
-  const auto add = [&](const Fit& fit, const auto& find) {
+  std::vector<double> squared(views.matches.size(), std::numeric_limits<double>::infinity());
+  const auto add = [&](const Fit& fit, ErrorKind kind, const std::vector<PointPair>& pairs,
+                       double max_error) {
     if (!fit.model) return;
     screened.num_inliers = std::max(screened.num_inliers, fit.inliers.size());
-    for (const std::size_t match : find()) is_near[match] = true;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const double error = SquaredError(kind, *fit.model, pairs[i]) / (max_error * max_error);
+      if (error < squared[i]) squared[i] = error;  // Not if it is not a number.
+    }
   };
-  add(search.fundamental, [&] {
-    return FindInliers(ErrorKind::kEpipolar, *search.fundamental.model, views.matches,
-                       bound * options.max_error);
-  });
-  add(search.essential, [&] { return search.EssentialInliers(bound); });
-  add(search.homography, [&] {
-    return FindInliers(ErrorKind::kHomography, *search.homography.model, views.matches,
-                       bound * options.max_error);
-  });
-  for (std::size_t i = 0; i < is_near.size(); ++i) {
-    if (is_near[i]) screened.near.push_back(i);
-  }
+  add(search.fundamental, ErrorKind::kEpipolar, views.matches, options.max_error);
+  add(search.essential, ErrorKind::kEpipolar, search.Normalized(), search.EssentialMaxError());
+  add(search.homography, ErrorKind::kHomography, views.matches, options.max_error);
+  screened.errors.reserve(squared.size());
+  for (const double value : squared) screened.errors.push_back(std::sqrt(value));
   return screened;
 }
 

@@ -63,14 +63,15 @@ struct TwoViewVerdict {
 // Fewer matches than min_num_inliers: degenerate.
 TwoViewVerdict VerifyTwoViews(const TwoViews& views, const TwoViewOptions& options);
 
-// For who asks COLMAP in the end: which matches are near one of the best models.
+// For who asks COLMAP in the end: how near the matches are to the best models.
 struct ScreenedTwoViews {
   // The most inliers that a model has.
   std::size_t num_inliers = 0;
-  // The matches that are within `bound` times max_error of one of the models, ascending.
-  std::vector<std::size_t> near;
+  // Of every match: the error of the model that it is nearest to, over max_error; infinite where
+  // no model says anything.
+  std::vector<double> errors;
   TwoViewTrials trials;
 };
-ScreenedTwoViews ScreenTwoViews(const TwoViews& views, const TwoViewOptions& options, double bound);
+ScreenedTwoViews ScreenTwoViews(const TwoViews& views, const TwoViewOptions& options);
 
 }  // namespace colmap_graphmatch

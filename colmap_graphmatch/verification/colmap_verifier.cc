@@ -58,7 +58,11 @@ ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const Verific
   shards_have_descriptors_ =
       !plan_.matches_here || options.geometry.guided_matching.value_or(false);
   arguments_ = FindArguments(on_warning);
-  arguments_for_few_trials_ = ArgumentsForFewTrials();
+  // COLMAP's least number of trials, to which it raises all others: seven of seven matches are
+  // inliers in every fifth of them.
+  arguments_for_most_ = ArgumentsForInliers(0.8, 100);
+  // As many as it takes by confidence to find such seven once.
+  arguments_for_half_ = ArgumentsForInliers(0.5, 2643);
   MakeTemplate();
 }
 
@@ -81,18 +85,16 @@ std::vector<std::string> ColmapVerifier::FindArguments(
   return arguments;
 }
 
-std::vector<std::string> ColmapVerifier::ArgumentsForFewTrials() const {
-  // COLMAP's least number of trials, to which it raises all others.
-  constexpr int kFewTrials = 100;
-  // Seven of seven matches are inliers in every fifth trial then.
-  constexpr double kInlierRatio = 0.8;
+std::vector<std::string> ColmapVerifier::ArgumentsForInliers(double share,
+                                                             int max_num_trials) const {
   VerificationOptions options = options_;
   GeometryOptions& geometry = options.geometry;
-  geometry.max_num_trials = std::min(kFewTrials, geometry.max_num_trials.value_or(kFewTrials));
+  geometry.max_num_trials =
+      std::min(max_num_trials, geometry.max_num_trials.value_or(max_num_trials));
   // Later versions reject pairs with a smaller share.
   const bool is_budget =
       std::make_tuple(colmap_.major, colmap_.minor, colmap_.patch) <= std::make_tuple(4, 2, 1);
-  if (is_budget) geometry.min_inlier_ratio = kInlierRatio;
+  if (is_budget) geometry.min_inlier_ratio = share;
   std::vector<std::string> unknown;  // They were warned of.
   return colmap_.Arguments(ColmapOptions(options, plan_), &unknown);
 }
@@ -189,7 +191,9 @@ std::vector<std::string> ColmapVerifier::Command(const std::filesystem::path& di
                                       "--match_type",
                                       "pairs"};
   const std::vector<std::string>& arguments =
-      trials == Trials::kFew ? arguments_for_few_trials_ : arguments_;
+      trials == Trials::kForMostInliers   ? arguments_for_most_
+      : trials == Trials::kForHalfInliers ? arguments_for_half_
+                                          : arguments_;
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }

@@ -42,8 +42,8 @@ class ColmapVerifier : public GeometryVerifier {
     return Verify(pairs, Trials::kAsAsked, should_stop);
   }
 
-  // kFew: as many trials as matches take of which most are inliers.
-  enum class Trials { kAsAsked, kFew };
+  // kForMostInliers, kForHalfInliers: as many as matches take of which most, or half, are inliers.
+  enum class Trials { kAsAsked, kForMostInliers, kForHalfInliers };
   ShardOutcome Verify(const std::vector<PairToVerify>& pairs, Trials trials,
                       const std::function<bool()>& should_stop);
   TwoViewConfiguration ConfigurationOfUnmatched() const override;
@@ -55,7 +55,7 @@ class ColmapVerifier : public GeometryVerifier {
  private:
   std::vector<std::string> FindArguments(
       const std::function<void(const std::string&)>& on_warning) const;
-  std::vector<std::string> ArgumentsForFewTrials() const;
+  std::vector<std::string> ArgumentsForInliers(double share, int max_num_trials) const;
   void MakeTemplate() const;
   // In this directory, with a list of its pairs.
   ShardFeatures MakeShard(const std::filesystem::path& directory,
@@ -75,7 +75,8 @@ class ColmapVerifier : public GeometryVerifier {
   const StopRequest& stop_;
   bool shards_have_descriptors_ = true;
   std::vector<std::string> arguments_;  // Of every run of matches_importer.
-  std::vector<std::string> arguments_for_few_trials_;
+  std::vector<std::string> arguments_for_most_;
+  std::vector<std::string> arguments_for_half_;
 
   mutable std::mutex mutex_;  // Of what follows.
   Statistics statistics_;

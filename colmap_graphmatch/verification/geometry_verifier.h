@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
@@ -43,6 +44,10 @@ class GeometryVerifier {
 
   // For a pair with too few matches to be given to Verify.
   virtual TwoViewConfiguration ConfigurationOfUnmatched() const = 0;
+
+  // How many times as many pairs as COLMAP alone it should get at a time, so that they are worth a
+  // start of COLMAP.
+  virtual std::size_t SizeOfShards() const { return 1; }
 
   // What a user is told who asks why it fails on everything; empty, or a sentence.
   virtual std::string AdviceOnFailure() const { return ""; }

@@ -16,14 +16,43 @@ namespace {
 // settled: no edge of COLMAP's was among them (docs/benchmarks.md).
 constexpr double kMinShareOfInliers = 0.86;
 
-// A pair with fewer than this share (21 of 15) is close: COLMAP gets it as it is. Whether it finds
-// the last inlier depends on how long it searches, which is the shorter the fewer outliers there
-// are.
-constexpr double kMaxCloseShare = 1.34;
+// A pair with fewer than this share (41 of 15) is close: whether COLMAP finds the last inlier
+// depends on how long it searches, which is the shorter the fewer outliers there are. So it gets at
+// least so many matches for each inlier, the nearest first, and trials for them.
+constexpr double kMaxCloseShare = 2.7;
+constexpr double kPadding = 2;
 
 // COLMAP gets the matches within so many times max_error of a model: those that its own fit, which
 // is a little different, may count.
 constexpr double kBound = 1.5;
+
+// What COLMAP is asked at once, and where the answers belong.
+struct Question {
+  std::vector<PairToVerify> pairs;
+  std::vector<std::size_t> places;
+
+  void Add(PairToVerify pair, std::size_t place) {
+    pairs.push_back(std::move(pair));
+    places.push_back(place);
+  }
+};
+
+// The matches that are within `bound` times max_error of a model, or, if these are fewer, the
+// `least_num` nearest; in their order.
+FeatureMatches Nearest(const FeatureMatches& matches, const std::vector<double>& errors,
+                       double bound, std::size_t least_num) {
+  if (least_num >= matches.size()) return matches;
+  std::vector<double> sorted = errors;
+  const auto last =
+      sorted.begin() + static_cast<std::ptrdiff_t>(std::max(least_num, std::size_t{1})) - 1;
+  std::nth_element(sorted.begin(), last, sorted.end());
+  const double greatest = std::max(bound, *last);
+  FeatureMatches nearest;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (errors[i] <= greatest) nearest.push_back(matches[i]);
+  }
+  return nearest;
+}
 
 }  // namespace
 
@@ -42,11 +71,9 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
   const auto min_edge = static_cast<double>(options.min_num_inliers);
   ShardOutcome outcome;
   outcome.results.resize(pairs.size());
-  // Where the results of what COLMAP gets belong.
-  std::vector<PairToVerify> trimmed;
-  std::vector<std::size_t> places_of_trimmed;
-  std::vector<PairToVerify> whole;
-  std::vector<std::size_t> places_of_whole;
+  Question trimmed;
+  Question close;
+  Question whole;
   FitStatistics statistics;
   const double start = ThreadCpuSeconds();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -57,16 +84,16 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
     }
     const PairToVerify& pair = pairs[i];
     if (pair.points.empty() || !cameras_.CanJudge(pair.pair)) {
-      whole.push_back(pair);
-      places_of_whole.push_back(i);
+      whole.Add(pair, i);
       continue;
     }
     ++statistics.num_fitted;
     const ScreenedTwoViews screened =
         ScreenTwoViews({pair.pair, *cameras_.Of(pair.pair.id1), *cameras_.Of(pair.pair.id2),
                         pair.points, pair.distinctness},
-                       options, kBound);
-    if (static_cast<double>(screened.num_inliers) < kMinShareOfInliers * min_edge) {
+                       options);
+    const auto num_inliers = static_cast<double>(screened.num_inliers);
+    if (num_inliers < kMinShareOfInliers * min_edge) {
       ++statistics.num_settled;
       PairGeometry& result = outcome.results[i];
       result.pair = pair.pair;
@@ -74,39 +101,33 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
       result.geometry.configuration = ConfigurationOfUnmatched();
       continue;
     }
-    if (static_cast<double>(screened.num_inliers) < kMaxCloseShare * min_edge) {
-      whole.push_back(pair);
-      places_of_whole.push_back(i);
-      continue;
-    }
-    PairToVerify& kept = trimmed.emplace_back();
+    const bool is_close = num_inliers < kMaxCloseShare * min_edge;
+    const auto least_num = static_cast<std::size_t>(is_close ? kPadding * num_inliers : 0);
+    PairToVerify kept;
     kept.pair = pair.pair;
-    kept.matches.emplace();
-    kept.matches->reserve(screened.near.size());
-    for (const std::size_t match : screened.near) kept.matches->push_back((*pair.matches)[match]);
-    places_of_trimmed.push_back(i);
+    kept.matches = Nearest(*pair.matches, screened.errors, kBound, least_num);
+    (is_close ? close : trimmed).Add(std::move(kept), i);
   }
   statistics.seconds = ThreadCpuSeconds() - start;
 
-  const auto ask_colmap = [&](const std::vector<PairToVerify>& asked,
-                              const std::vector<std::size_t>& places,
-                              ColmapVerifier::Trials trials) {
-    if (asked.empty()) return true;
-    ShardOutcome verdict = colmap_.Verify(asked, trials, should_stop);
+  const auto ask_colmap = [&](const Question& question, ColmapVerifier::Trials trials) {
+    if (question.pairs.empty()) return true;
+    ShardOutcome verdict = colmap_.Verify(question.pairs, trials, should_stop);
     if (verdict.stopped || !verdict.problem.empty()) {
       outcome = std::move(verdict);
       return false;
     }
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-      PairGeometry& result = outcome.results[places[i]];
+    for (std::size_t i = 0; i < question.pairs.size(); ++i) {
+      const PairToVerify& pair = pairs[question.places[i]];
+      PairGeometry& result = outcome.results[question.places[i]];
       result = std::move(verdict.results[i]);
-      const PairToVerify& pair = pairs[places[i]];
       if (pair.matches) result.matches = *pair.matches;
     }
     return true;
   };
-  if (ask_colmap(trimmed, places_of_trimmed, ColmapVerifier::Trials::kFew) &&
-      ask_colmap(whole, places_of_whole, ColmapVerifier::Trials::kAsAsked)) {
+  using Trials = ColmapVerifier::Trials;
+  if (ask_colmap(trimmed, Trials::kForMostInliers) && ask_colmap(close, Trials::kForHalfInliers) &&
+      ask_colmap(whole, Trials::kAsAsked)) {
     const std::lock_guard<std::mutex> lock(mutex_);
     statistics_.seconds += statistics.seconds;
     statistics_.num_fitted += statistics.num_fitted;

@@ -193,20 +193,22 @@ void Screen(const Stored& stored) {
     const Camera& camera2 = stored.cameras.at(stored.camera_of.at(pair.pair.id2));
     const bool is_edge = IsEdge(pair.num_inliers, pair.config, options.min_num_inliers);
     if (!is_edge) ++num_others;
+    const ScreenedTwoViews screened =
+        ScreenTwoViews({pair.pair, camera1, camera2, pair.points, {}}, options);
+    for (std::size_t least = 10; least <= 15; ++least) {
+      if (screened.num_inliers < least) ++(is_edge ? below[least].first : below[least].second);
+    }
+    if (!is_edge) continue;
     for (const double bound : {1.0, 1.25, 1.5, 2.0}) {
-      const ScreenedTwoViews screened =
-          ScreenTwoViews({pair.pair, camera1, camera2, pair.points, {}}, options, bound);
-      if (bound == 1.0) {
-        for (std::size_t least = 10; least <= 15; ++least) {
-          if (screened.num_inliers < least) ++(is_edge ? below[least].first : below[least].second);
-        }
-      }
-      if (!is_edge) continue;
       std::size_t num = 0;
-      for (const std::size_t match : screened.near) num += pair.inliers.count(match);
+      std::size_t num_near = 0;
+      for (std::size_t match = 0; match < screened.errors.size(); ++match) {
+        if (screened.errors[match] > bound) continue;
+        ++num_near;
+        num += pair.inliers.count(match);
+      }
       kept[bound].push_back(static_cast<double>(num) / static_cast<double>(pair.inliers.size()));
-      share[bound] +=
-          static_cast<double>(screened.near.size()) / static_cast<double>(pair.points.size());
+      share[bound] += static_cast<double>(num_near) / static_cast<double>(pair.points.size());
     }
   }
   for (const auto& [least, nums] : below) {
