@@ -697,6 +697,15 @@ TEST_F(InProcessTest, ColmapIsTheJudgeOfWhatIsLikely) {
   EXPECT_EQ(NumMatches(ImagePair(1, 2)), 30U);
 }
 
+// There it would reject pairs instead.
+TEST_F(InProcessTest, RecentVersionsGetNoInlierRatio) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  Set("FAKE_COLMAP_VERSION", "COLMAP 4.2.1 (Commit x on y without GPU support)");
+  EXPECT_TRUE(Verify({ImagePair(1, 2)}));
+  EXPECT_THAT(Log(), Contains(HasSubstr("max_num_trials=")));
+  EXPECT_THAT(Log(), Not(Contains(HasSubstr("min_inlier_ratio="))));
+}
+
 TEST_F(InProcessTest, HopelessPairsAreSettledAndKeepTheirMatches) {
   options_.verifier = VerificationOptions::Verifier::kScreened;
   Scatter(2, 0);

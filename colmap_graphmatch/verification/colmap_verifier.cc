@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <tuple>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -29,6 +28,9 @@ constexpr char kMatcherType[] = "FeatureMatching.type";
 // The first COLMAP that is known to store pairs with too few matches as degenerate instead of
 // undefined.
 constexpr std::pair<int, int> kFirstDegenerate(4, 2);
+
+// The first version in which min_inlier_ratio is more than a budget of trials.
+constexpr std::pair<int, int> kFirstToReject(4, 2);
 
 // In the directory of a shard.
 std::filesystem::path ShardPath(const std::filesystem::path& directory) {
@@ -91,9 +93,8 @@ std::vector<std::string> ColmapVerifier::ArgumentsForInliers(double share,
   GeometryOptions& geometry = options.geometry;
   geometry.max_num_trials =
       std::min(max_num_trials, geometry.max_num_trials.value_or(max_num_trials));
-  // Later versions reject pairs with a smaller share.
-  const bool is_budget =
-      std::make_tuple(colmap_.major, colmap_.minor, colmap_.patch) <= std::make_tuple(4, 2, 1);
+  // From COLMAP 4.2 on pairs with a smaller share are rejected.
+  const bool is_budget = std::make_pair(colmap_.major, colmap_.minor) < kFirstToReject;
   if (is_budget) geometry.min_inlier_ratio = share;
   std::vector<std::string> unknown;  // They were warned of.
   return colmap_.Arguments(ColmapOptions(options, plan_), &unknown);
