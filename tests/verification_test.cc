@@ -58,6 +58,7 @@ class VerifierTest : public ::testing::Test {
     WriteSyntheticDatabase(database_path_, Schema::kColmap38, MakePlaces(5, 5, 30, 1));
     // These images match as the test double says, not as their descriptors do.
     options_.matcher = VerificationOptions::Matcher::kColmap;
+    options_.verifier = VerificationOptions::Verifier::kColmap;
     options_.lock_timeout = 5;
   }
 
@@ -754,6 +755,26 @@ TEST_F(InProcessTest, WhatTheFitCannotJudgeGoesToColmapWhole) {
   EXPECT_EQ(fits_.num_fitted, 0U);
   EXPECT_THAT(Log(), Contains("given 1 2: 30"));
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("25 images have cameras")));
+}
+
+TEST_F(InProcessTest, AutoIsScreenedWhereThereIsAColmap) {
+  using Verifier = VerificationOptions::Verifier;
+  options_ = VerificationOptions();
+  EXPECT_EQ(PlanVerification(options_, 1, ColmapInstallation()).verifier, Verifier::kScreened);
+  EXPECT_EQ(PlanVerification(options_, 1, std::nullopt).verifier, Verifier::kNative);
+  EXPECT_TRUE(CanDoWithoutColmap(options_));
+  ColmapInstallation with_gpu;
+  with_gpu.has_gpu = true;
+  EXPECT_EQ(PlanVerification(options_, 1, with_gpu).verifier, Verifier::kColmap);
+  options_.geometry.guided_matching = true;
+  EXPECT_EQ(PlanVerification(options_, 1, ColmapInstallation()).verifier, Verifier::kColmap);
+  EXPECT_FALSE(CanDoWithoutColmap(options_));
+  options_ = VerificationOptions();
+  options_.matcher = VerificationOptions::Matcher::kColmap;
+  EXPECT_FALSE(CanDoWithoutColmap(options_));
+  options_ = VerificationOptions();
+  options_.verifier = Verifier::kScreened;
+  EXPECT_FALSE(CanDoWithoutColmap(options_));
 }
 
 TEST_F(InProcessTest, WhatOnlyColmapHasGoesToColmap) {

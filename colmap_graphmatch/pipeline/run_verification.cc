@@ -19,10 +19,17 @@ namespace colmap_graphmatch {
 namespace {
 
 std::optional<ColmapInstallation> FindColmap(const RunSetup& setup, const WorkDirectory& work) {
-  const bool is_needed =
-      setup.options.verification.verifier != VerificationOptions::Verifier::kNative;
-  if (!is_needed) return std::nullopt;
-  return DetectColmap(setup.options.colmap_path, work.Path(), setup.stop);
+  const VerificationOptions& options = setup.options.verification;
+  const std::string& path = setup.options.colmap_path;
+  if (options.verifier == VerificationOptions::Verifier::kNative) return std::nullopt;
+  const bool is_named = path != PipelineOptions().colmap_path;
+  if (!is_named && CanDoWithoutColmap(options) && !IsOnPath(path)) {
+    setup.messages.warn(
+        "There is no COLMAP on the PATH: this program verifies the pairs itself, with almost the "
+        "same results. To have COLMAP do it, install it or name it with --colmap_path.");
+    return std::nullopt;
+  }
+  return DetectColmap(path, work.Path(), setup.stop);
 }
 
 const char* DescriptionOf(VerificationOptions::Verifier verifier) {
@@ -31,6 +38,7 @@ const char* DescriptionOf(VerificationOptions::Verifier verifier) {
       return "Pairs are verified by this program.";
     case VerificationOptions::Verifier::kScreened:
       return "Pairs are verified by COLMAP, after a fast fit.";
+    case VerificationOptions::Verifier::kAuto:  // A plan has made its choice.
     case VerificationOptions::Verifier::kColmap:
       break;
   }
@@ -43,8 +51,7 @@ class ByMatching : public RunVerification {
       : database_(*setup.database),
         work_(setup.options.work_path, WorkDirectory::Guard::kGuarded),
         colmap_(FindColmap(setup, work_)),
-        plan_(PlanVerification(setup.options.verification, setup.options.num_threads,
-                               colmap_.value_or(ColmapInstallation()))),
+        plan_(PlanVerification(setup.options.verification, setup.options.num_threads, colmap_)),
         geometry_(setup.options.verification, plan_, colmap_, database_, setup.images, work_.Path(),
                   setup.stop, setup.messages.warn),
         verifier_(setup.options.verification, plan_, geometry_.Get(), database_, setup.images,

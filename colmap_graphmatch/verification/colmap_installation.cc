@@ -71,6 +71,8 @@ std::string Output(const std::vector<std::string>& command, const std::filesyste
 
 }  // namespace
 
+bool IsOnPath(const std::string& name) { return !boost::process::search_path(name).empty(); }
+
 std::string WithoutGroup(const std::string& option) { return option.substr(option.find('.') + 1); }
 
 std::string ColmapInstallation::Version() const {

@@ -38,6 +38,9 @@ struct ColmapInstallation {
 // "max_error" of "TwoViewGeometry.max_error", and what has no group as it is.
 std::string WithoutGroup(const std::string& option);
 
+// Whether a program of this name is on the PATH.
+bool IsOnPath(const std::string& name);
+
 // Asks the program what it is. colmap_path: a path, or a name to be found on PATH. work_path: a
 // directory for what it prints. Throws ColmapError if there is no such program, or if it is not
 // COLMAP 3.8 or later; FileError if the disk of work_path is full; StoppedError if stop asks for

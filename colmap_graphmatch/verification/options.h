@@ -28,10 +28,10 @@ struct VerificationOptions {
   Matcher matcher = Matcher::kAuto;
 
   // Who decides whether a pair is an edge. kColmap: COLMAP alone. kScreened: the same, but a fast
-  // fit goes first and settles hopeless pairs. kNative: this library. Where COLMAP matches, it
-  // also verifies.
-  enum class Verifier { kScreened, kColmap, kNative };
-  Verifier verifier = Verifier::kColmap;
+  // fit goes first. kNative: this library. kAuto: kScreened, or kNative where no COLMAP was named
+  // and none is on the PATH. Where COLMAP matches, it also verifies.
+  enum class Verifier { kAuto, kScreened, kColmap, kNative };
+  Verifier verifier = Verifier::kAuto;
 
   ExactMatcherOptions exact;
 
@@ -71,8 +71,9 @@ inline constexpr EnumWords<VerificationOptions::Matcher, 3> kMatcherWords = {
      {VerificationOptions::Matcher::kExact, "exact"},
      {VerificationOptions::Matcher::kColmap, "colmap"}}};
 
-inline constexpr EnumWords<VerificationOptions::Verifier, 3> kVerifierWords = {
-    {{VerificationOptions::Verifier::kScreened, "screened"},
+inline constexpr EnumWords<VerificationOptions::Verifier, 4> kVerifierWords = {
+    {{VerificationOptions::Verifier::kAuto, "auto"},
+     {VerificationOptions::Verifier::kScreened, "screened"},
      {VerificationOptions::Verifier::kColmap, "colmap"},
      {VerificationOptions::Verifier::kNative, "native"}}};
 

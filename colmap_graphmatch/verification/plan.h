@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "colmap_graphmatch/verification/colmap_installation.h"
 #include "colmap_graphmatch/verification/options.h"
 
@@ -14,9 +16,12 @@ struct VerificationPlan {
   int threads_per_process = 1;
 };
 
-// num_threads: the cores that all COLMAP processes together may use, at least 1; -1: all. Throws
-// OptionsError.
+// num_threads: the cores that all COLMAP processes together may use, at least 1; -1: all. colmap:
+// nothing if there is none, or no need of one. Throws OptionsError.
 VerificationPlan PlanVerification(const VerificationOptions& options, int num_threads,
-                                  const ColmapInstallation& colmap);
+                                  const std::optional<ColmapInstallation>& colmap);
+
+// Whether pairs can be matched and verified without a COLMAP as well, as far as the options say.
+bool CanDoWithoutColmap(const VerificationOptions& options);
 
 }  // namespace colmap_graphmatch

@@ -210,7 +210,7 @@ printf '\xff' | dd of="$database" bs=1 seek=$(((page - 1) * 4096)) conv=notrunc 
 piece='database disk image is malformed. The file is damaged: `sqlite3 FILE .recover` may save its contents.' \
   says 2 'The file is damaged inside' "${run[@]}"
 fresh
-"${run[@]}" --GraphMatching.max_pairs 40 >"$work/output.txt" 2>&1
+"${run[@]}" --GraphMatching.verifier colmap --GraphMatching.max_pairs 40 >"$work/output.txt" 2>&1
 change 'PRAGMA journal_mode = DELETE'
 # Where the rows of a page begin, as its header says, is behind them.
 page=$(sqlite3 "$database" "SELECT rootpage FROM sqlite_schema WHERE name = 'matches'")
@@ -536,6 +536,10 @@ fresh
 with 4 'There is no such program' none
 says 4 'There is no such program on the PATH' \
   "$matcher" --database_path "$database" --colmap_path no-such-colmap
+fresh
+says 0 'There is none on the PATH, and none was named' \
+  env PATH="$work/none" "$matcher" --database_path "$database"
+fresh
 mkdir "$work/programs/directory"
 with 4 'It is a directory' directory
 program not-executable <<<'#!/bin/bash'

@@ -264,7 +264,8 @@ wait
 for num_signals in 2 1; do
   fresh big
   sqlite3 database.db 'PRAGMA journal_mode = DELETE' >/dev/null
-  FAKE_COLMAP_DELAY_MS=20 "${run[@]}" --GraphMatching.lock_timeout 25 >"$work/output.txt" 2>&1 &
+  FAKE_COLMAP_DELAY_MS=20 "${run[@]}" --GraphMatching.verifier colmap --GraphMatching.lock_timeout 25 \
+    >"$work/output.txt" 2>&1 &
   pid=$!
   while (($(sqlite3 database.db '.timeout 5000' 'SELECT count(*) FROM two_view_geometries') == 0)); do sleep 0.05; done
   hold database.db
