@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -186,7 +187,8 @@ TEST(Options, RejectsWhatCannotBe) {
            [](GraphMatchOptions* o) { o->number_sample_iterations = -1; },
            [](GraphMatchOptions* o) { o->max_num_neighbors = 0; },
            [](GraphMatchOptions* o) { o->num_to_propagate = -1; },
-           [](GraphMatchOptions* o) { o->max_tests_for_sampling = -1; }}) {
+           [](GraphMatchOptions* o) { o->max_tests_for_sampling = -1; },
+           [](GraphMatchOptions* o) { o->max_failed_samples = -1; }}) {
     GraphMatchOptions options;
     EXPECT_NO_THROW(options.Check());
     break_option(&options);
@@ -284,7 +286,6 @@ TEST(Sampling, StopsAtTheBudget) {
   MatchingGraph graph(30);
   for (int i = 0; i < 3; ++i) {
     EXPECT_FALSE(sampler.Propose(i, graph).empty());
-    sampler.Spend();
   }
   EXPECT_THAT(sampler.Propose(3, graph), IsEmpty());
 }
@@ -1102,6 +1103,35 @@ TEST(Explore, ProposersLearnTheInliersOfEveryPair) {
               ElementsAre(Pair(VertexPair(0, 1), one(10, 20)), Pair(VertexPair(0, 2), IsEmpty()),
                           Pair(VertexPair(0, 3), IsEmpty()), Pair(VertexPair(1, 2), one(20, 30)),
                           Pair(VertexPair(2, 3), one(30, 40))));
+}
+
+TEST(Explore, RefusesAProposalThatDoesNotAscend) {
+  class OneProposal : public PairProposer {
+   public:
+    explicit OneProposal(std::vector<VertexPair> pairs) : pairs_(std::move(pairs)) {}
+    std::optional<Proposal> Next(const MatchingGraph& /*graph*/) override {
+      return Proposal{pairs_, LoopStage::kListed, 0};
+    }
+
+   private:
+    std::vector<VertexPair> pairs_;
+  };
+  for (const std::vector<VertexPair>& pairs :
+       {std::vector<VertexPair>{{0, 2}, {0, 1}}, std::vector<VertexPair>{{0, 1}, {0, 1}}}) {
+    OneProposal proposer(pairs);
+    RecordingVerifier verifier({});
+    EXPECT_THROW(Explore(proposer, {10, 20, 30}, verifier, {}), std::logic_error);
+    EXPECT_THAT(verifier.batches, IsEmpty());
+  }
+}
+
+TEST(LoopStage, EveryStageHasItsPlaceAndItsName) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < kLoopStages.size(); ++i) {
+    EXPECT_EQ(static_cast<std::size_t>(kLoopStages[i]), i);
+    EXPECT_TRUE(names.insert(StageName(kLoopStages[i])).second);
+  }
+  EXPECT_EQ(names.count("unknown"), 0U);
 }
 
 TEST(ReplayVerifier, AnswersFromTheGraph) {

@@ -21,8 +21,8 @@ ExplorationResult Explore(PairProposer& proposer, const std::vector<ImageId>& im
       break;
     }
   }
-  // A run that was stopped may not have come to all of it.
-  if (known.others_join_in_the_end) builder.AddKnown(proposer);
+  // A run that was stopped did not get there: what is known is part of its graph, too.
+  if (!builder.Continues() && known.others_join_in_the_end) builder.AddKnown(proposer);
   return builder.Finish();
 }
 

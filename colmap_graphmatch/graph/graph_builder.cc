@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <stdexcept>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -71,23 +72,27 @@ bool GraphBuilder::AddSeeds(const std::vector<TestedVertexPair>& seeds, PairProp
 }
 
 StageStatistics GraphBuilder::Verify(const Proposal& proposal, PairProposer& proposer) {
+  const std::vector<VertexPair>& pairs = proposal.pairs;
+  if (std::adjacent_find(pairs.begin(), pairs.end(), std::greater_equal<>()) != pairs.end()) {
+    throw std::logic_error("The pairs of a proposal must ascend, each once.");
+  }
   StageStatistics batch;
   const Stopwatch stopwatch;
   const ExpectedTests after =
       on_progress_ ? proposer.TestsAfter(proposal, graph_) : ExpectedTests();
   std::vector<ImagePair> image_pairs;
-  image_pairs.reserve(proposal.pairs.size());
-  for (const VertexPair& pair : proposal.pairs) {
+  image_pairs.reserve(pairs.size());
+  for (const VertexPair& pair : pairs) {
     image_pairs.emplace_back(image_ids_[pair.first], image_ids_[pair.second]);
   }
   // Vertices ascend with image ids, so the pairs do too and can be found again by bisection.
   std::vector<TestedVertexPair> tested;
-  tested.reserve(proposal.pairs.size());
+  tested.reserve(pairs.size());
   StageStatistics& total = result_.stages[proposal.stage];
   const StageStatistics before = total;
   result_.finished = verifier_.Verify(image_pairs, [&](const VerifiedPair& verified) {
     const auto place = std::lower_bound(image_pairs.begin(), image_pairs.end(), verified.pair);
-    const VertexPair pair = proposal.pairs[static_cast<std::size_t>(place - image_pairs.begin())];
+    const VertexPair pair = pairs[static_cast<std::size_t>(place - image_pairs.begin())];
     const bool is_edge = verified.outcome == PairOutcome::kEdge;
     if (verified.is_known) {
       ++batch.num_known;
@@ -108,7 +113,7 @@ StageStatistics GraphBuilder::Verify(const Proposal& proposal, PairProposer& pro
     progress.stage = proposal.stage;
     progress.iteration = proposal.iteration;
     progress.last = verified;
-    const auto num_left = static_cast<double>(proposal.pairs.size() - tested.size());
+    const auto num_left = static_cast<double>(pairs.size() - tested.size());
     const bool is_sampling = proposal.stage == LoopStage::kSampling;
     progress.expected_remaining_samples =
         static_cast<std::size_t>(after.samples + (is_sampling ? num_left : 0));

@@ -26,6 +26,7 @@ class GraphBuilder {
   bool AddKnown(const std::vector<ImagePair>& pairs, PairProposer& proposer);
 
   // Has the proposed pairs tested, and adds them. Returns the statistics of this batch alone.
+  // Throws std::logic_error if the pairs do not ascend, before any is tested.
   StageStatistics Verify(const Proposal& proposal, PairProposer& proposer);
 
   // False once the verifier was asked to stop: nothing more is to be verified.

@@ -22,33 +22,34 @@ std::optional<Proposal> GraphMatchProposer::Next(const MatchingGraph& graph) {
   if (graph.NumVertices() != ranking_.NumVertices()) {
     throw OptionsError("Every ranked image needs its id.");
   }
-  const bool has_propagated = stage_ == LoopStage::kPropagation;
-  if (has_propagated) {
-    ++iteration_;
-    stage_ = LoopStage::kSampling;
-    if (std::vector<VertexPair> pairs = Sample(graph); !pairs.empty()) {
-      return Proposal{std::move(pairs), stage_, iteration_};
-    }
+  // The samples of this iteration are tested: what they lead to is next. If that is nothing, the
+  // loop goes on nevertheless, as sampling was not empty.
+  if (has_sampled_) {
+    if (std::optional<Proposal> pairs = ProposePropagation(graph)) return pairs;
   }
-  stage_ = LoopStage::kPropagation;
-  std::vector<VertexPair> pairs = Propagate(options_, ranking_, graph, threads_);
-  remaining_.OnPropagation(iteration_, pairs.size());
-  if (!pairs.empty()) {
-    return Proposal{std::move(pairs), stage_, iteration_};
-  }
-  // Sampling may go on where propagation has come to its end.
-  return has_propagated ? std::nullopt : Next(graph);
+  ++iteration_;
+  if (std::optional<Proposal> pairs = ProposeSamples(graph)) return pairs;
+  return ProposePropagation(graph);  // Or nothing: both were empty.
 }
 
-std::vector<VertexPair> GraphMatchProposer::Sample(const MatchingGraph& graph) {
+std::optional<Proposal> GraphMatchProposer::ProposeSamples(const MatchingGraph& graph) {
   std::vector<VertexPair> pairs = sampler_.Propose(iteration_, graph);
-  sampler_.Spend();
   remaining_.OnSampling(iteration_, pairs.size(), sampler_.NumDrawn());
-  return pairs;
+  has_sampled_ = !pairs.empty();
+  if (pairs.empty()) return std::nullopt;
+  return Proposal{std::move(pairs), LoopStage::kSampling, iteration_};
+}
+
+std::optional<Proposal> GraphMatchProposer::ProposePropagation(const MatchingGraph& graph) {
+  has_sampled_ = false;
+  std::vector<VertexPair> pairs = Propagate(options_, ranking_, graph, threads_);
+  remaining_.OnPropagation(iteration_, pairs.size());
+  if (pairs.empty()) return std::nullopt;
+  return Proposal{std::move(pairs), LoopStage::kPropagation, iteration_};
 }
 
 void GraphMatchProposer::OnTested(const StageStatistics& batch) {
-  remaining_.OnTested(stage_, batch);
+  remaining_.OnTested(has_sampled_ ? LoopStage::kSampling : LoopStage::kPropagation, batch);
 }
 
 ExpectedTests GraphMatchProposer::TestsAfter(const Proposal& proposal,
@@ -99,8 +100,11 @@ std::vector<ImagePair> ChooseSeeds(const GraphMatchOptions& options, const Ranki
   const std::size_t num_known = Explore(nothing, image_ids, known_only, silent).num_seed_pairs;
   const auto asks_for_all_known = [&](const std::vector<ImagePair>& seeds) {
     GraphMatchProposer proposer(options, ranking, threads);
+    KnownPairsPolicy seeds_alone;
+    seeds_alone.seeds = seeds;
+    seeds_alone.others_join_in_the_end = false;
     const ExplorationResult rehearsed =
-        Explore(proposer, image_ids, known_only, silent, {seeds, false});
+        Explore(proposer, image_ids, known_only, silent, seeds_alone);
     return rehearsed.num_seed_pairs + rehearsed.stages.All().num_known == num_known;
   };
   if (!earlier_seeds.empty() && asks_for_all_known(earlier_seeds)) return earlier_seeds;

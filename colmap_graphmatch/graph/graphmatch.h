@@ -29,15 +29,17 @@ class GraphMatchProposer : public PairProposer {
   ExpectedTests TestsAfter(const Proposal& proposal, const MatchingGraph& graph) const override;
 
  private:
-  std::vector<VertexPair> Sample(const MatchingGraph& graph);
+  // One half of the iteration; nothing if it has no pairs.
+  std::optional<Proposal> ProposeSamples(const MatchingGraph& graph);
+  std::optional<Proposal> ProposePropagation(const MatchingGraph& graph);
 
   const GraphMatchOptions options_;
   const Ranking& ranking_;
   ThreadPool& threads_;
   Sampler sampler_;
   RemainingTests remaining_;
-  LoopStage stage_ = LoopStage::kPropagation;  // Of the last proposal, or of none.
-  int iteration_ = -1;
+  int iteration_ = -1;        // Of the last proposal.
+  bool has_sampled_ = false;  // The last proposal was samples.
 };
 
 // Finds out which known pairs have to be part of the graph from the start, so that what earlier

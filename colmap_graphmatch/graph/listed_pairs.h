@@ -10,9 +10,8 @@
 
 namespace colmap_graphmatch {
 
-// Pairs that are given beforehand instead of found. Known pairs are asked for like all others, in
-// the same batches, so that a run that goes on after an interruption ends like one that was not
-// interrupted. Pairs that the restrictions do not allow are left out.
+// Pairs that are given beforehand instead of found. Those that the restrictions do not allow are
+// left out.
 
 // All pairs of the vertices, block by block.
 class AllPairsProposer : public PairProposer {

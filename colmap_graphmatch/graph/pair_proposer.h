@@ -12,7 +12,9 @@ namespace colmap_graphmatch {
 
 // Pairs to be tested next, as one batch.
 struct Proposal {
-  std::vector<VertexPair> pairs;  // Ascending, not empty; none of them is in the graph.
+  // Ascending, each once, not empty; none of them is in the graph. Only the order of the batches
+  // says what comes first: within one, the verifier tests pairs in an order of its own.
+  std::vector<VertexPair> pairs;
   LoopStage stage = LoopStage::kSampling;
   int iteration = 0;
 };
@@ -25,11 +27,16 @@ struct ExpectedTests {
 
 // Decides which pairs are tested: a strategy. It sees the graph and what became of its proposals,
 // and nothing else of the run; what it proposes depends on that alone.
+//
+// Pairs that earlier runs tested are proposed like all others, in the same batches: they are
+// answered from what is known, so a run that goes on after an interruption ends like one that was
+// not interrupted.
 class PairProposer {
  public:
   virtual ~PairProposer() = default;
 
-  // The next pairs to test; none if it has no more to propose as things stand.
+  // The next pairs to test; none if it has no more to propose as things stand. That need not be the
+  // end: it is asked again if pairs that others had tested join the graph.
   virtual std::optional<Proposal> Next(const MatchingGraph& graph) = 0;
 
   // A pair of the last proposal was verified, or one that others had tested joins the graph; the

@@ -33,8 +33,7 @@ std::vector<VertexPair> RetrievePairs(const RetrievalOptions& options, const Ran
 // The rivals of the paper (GraphMatch, section 4): every image with its nearest ones, all in one
 // batch; then, in each round of query expansion, with the neighbours of its neighbours in the graph
 // that was found before (Agarwal et al., Building Rome in a Day, ICCV 2009, section 3.3: if i and k
-// match j, i and k are tested). Known pairs are asked for like all others, in the same batches, so
-// that an interrupted run ends like one that was not.
+// match j, i and k are tested).
 class RetrievalProposer : public PairProposer {
  public:
   // ranking and threads must outlive it. Throws OptionsError.

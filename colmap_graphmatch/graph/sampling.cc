@@ -62,6 +62,7 @@ std::vector<VertexPair> Sampler::Propose(int iteration, const MatchingGraph& gra
       return;
     }
     drawn_[i] = NextUntested(vertex, static_cast<std::size_t>(num), graph);
+    num_drawn_[i] += static_cast<int>(drawn_[i].size());
   });
   std::vector<VertexPair> pairs;
   for (Vertex vertex = 0; vertex < num_vertices; ++vertex) {
@@ -98,12 +99,6 @@ void Sampler::SpendOnTested(const MatchingGraph& graph) {
     const bool done = num_tested >= std::min(num_planned, num_seen);
     num_drawn_[i] = std::max(num_drawn_[i], done ? budget : num_tested);
   });
-}
-
-void Sampler::Spend() {
-  for (std::size_t i = 0; i < drawn_.size(); ++i) {
-    num_drawn_[i] += static_cast<int>(drawn_[i].size());
-  }
 }
 
 }  // namespace colmap_graphmatch

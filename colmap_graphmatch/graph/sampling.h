@@ -17,16 +17,13 @@ class Sampler {
   Sampler(const GraphMatchOptions& options, const Ranking& ranking, ThreadPool& threads);
 
   // The pairs to test in an iteration (counted from 0), ascending, each once. Degrees and tested
-  // pairs are those of the graph as it is now. Does not spend any budget.
+  // pairs are those of the graph as it is now. Each vertex spends what it draws of its budget, so
+  // to be called for proposals that are tested.
   std::vector<VertexPair> Propose(int iteration, const MatchingGraph& graph);
 
   // The pairs that the vertices drew in the last proposal: more than it has, as two may draw each
   // other.
   std::size_t NumDrawn() const;
-
-  // Spends the budgets of the vertices that drew the proposed pairs. To be called once for every
-  // proposal that is tested, before the next one is made.
-  void Spend();
 
   // Spends the budget of every vertex on the tested pairs among the first MaxTestsForSampling of
   // its ranked list: whoever tested them did what sampling would have done. Vertices without any

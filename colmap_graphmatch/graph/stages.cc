@@ -13,9 +13,9 @@ const char* StageName(LoopStage stage) {
     case LoopStage::kExpansion:
       return "expansion";
     case LoopStage::kListed:
-      break;
+      return "listed";
   }
-  return "listed";
+  return "unknown";
 }
 
 StageStatistics operator+(const StageStatistics& a, const StageStatistics& b) {

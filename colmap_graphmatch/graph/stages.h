@@ -6,11 +6,24 @@
 namespace colmap_graphmatch {
 
 // Who proposed a pair. kSampling, kPropagation: the paper's loop. kListed: the pairs were given
-// beforehand, or are all. kRetrieval: the ranking, kExpansion: query expansion after it.
-enum class LoopStage { kSampling, kPropagation, kListed, kRetrieval, kExpansion };
+// beforehand, or are all. kRetrieval: the ranking, kExpansion: query expansion after it. kLast is
+// another name of the last one.
+enum class LoopStage {
+  kSampling,
+  kPropagation,
+  kListed,
+  kRetrieval,
+  kExpansion,
+  kLast = kExpansion
+};
+
+// All of them, in the order of the enumeration.
 inline constexpr std::array<LoopStage, 5> kLoopStages = {
     LoopStage::kSampling, LoopStage::kPropagation, LoopStage::kListed, LoopStage::kRetrieval,
     LoopStage::kExpansion};
+static_assert(kLoopStages.size() == static_cast<std::size_t>(LoopStage::kLast) + 1 &&
+                  kLoopStages.back() == LoopStage::kLast,
+              "kLoopStages must have every LoopStage.");
 
 // The lower-case word for a stage in logs and reports.
 const char* StageName(LoopStage stage);
@@ -34,9 +47,11 @@ StageStatistics operator+(const StageStatistics& a, const StageStatistics& b);
 // Of every stage.
 class StagesStatistics {
  public:
-  StageStatistics& operator[](LoopStage stage) { return stages_[static_cast<std::size_t>(stage)]; }
+  StageStatistics& operator[](LoopStage stage) {
+    return stages_.at(static_cast<std::size_t>(stage));
+  }
   const StageStatistics& operator[](LoopStage stage) const {
-    return stages_[static_cast<std::size_t>(stage)];
+    return stages_.at(static_cast<std::size_t>(stage));
   }
   StageStatistics All() const;
 

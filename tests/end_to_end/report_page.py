@@ -193,6 +193,16 @@ class PageTest(unittest.TestCase):
         self.assertEqual(rows['All'][1], f'{self.report["graph"]["edges"]:,}')
         self.assertEqual(len(self.cells('#iterations')), 2)
 
+    def test_a_stage_that_the_page_does_not_know(self):
+        report = rich_report()
+        report['stages']['divination'] = stage(tested=1234, edges=1, seconds=50.0)
+        self.open(report)
+        rows = {row[0]: row[1:] for row in self.cells('#stages')}
+        self.assertEqual(list(rows), ['Sampling', 'Propagation', 'Listed', 'Divination', 'All'])
+        self.assertEqual(rows['Divination'][0], '1,234')
+        self.assertEqual(rows['All'][0], f'{sum(s["tested"] for s in report["stages"].values()):,}')
+        self.assertIn('Divination', self.text('#time-legend'))
+
     def test_discovery(self):
         self.open(rich_report())
         curves = 'return document.querySelectorAll("#discovery-chart .curve").length'

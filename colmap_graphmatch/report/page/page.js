@@ -13,7 +13,9 @@ const numImages = names.length;
 const numEdges = report.edge_list.length;
 const components = report.connected_components;
 const minInliers = report.min_num_inliers;
-const stageNames = ['sampling', 'propagation', 'listed', 'retrieval', 'expansion'];
+// In the order of a run; then those that this page does not know yet.
+const stageNames = [...new Set(['sampling', 'propagation', 'listed', 'retrieval', 'expansion',
+  ...Object.keys(report.stages)])];
 
 // The edges by inliers, most first.
 const edges = report.edge_list.slice().sort((a, b) => b[2] - a[2]);
@@ -103,6 +105,8 @@ const duration = (seconds) => {
 };
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+// A stage without a colour of its own is grey.
+const tintOf = (name) => `var(--${name}, var(--faint))`;
 
 // element('p.note', {title: 't'}, 'text', otherElement, ...)
 function element(kind, attributes, ...children) {
@@ -129,7 +133,7 @@ const prose = (text) => text.split(/(--[A-Za-z]+\.[a-z_]+)/).map((part, i) =>
 const imageButton = (image) =>
   element('button.name', {type: 'button', onclick: () => openPanel(image)}, names[image]);
 const imageWithThumbnail = (image) => element('div.pair', {}, thumbnail(image), imageButton(image));
-const swatch = (name, kind = 'span.swatch') => element(kind, {style: `background: var(--${name})`});
+const swatch = (name, kind = 'span.swatch') => element(kind, {style: `background: ${tintOf(name)}`});
 const legendItem = (mark, text) => element('span', {}, mark, text);
 const outline = (name, kind) => element(kind, {style: `border-color: var(--${name})`});
 
@@ -272,7 +276,7 @@ function drawDiscovery() {
 
   const line = d3.line().x((point) => x(at(point))).y((point) => y(point.edges));
   const draw = (run, name) => svg.append('path').attr('class', 'curve').attr('d', line(run))
-    .style('stroke', `var(--${name})`);
+    .style('stroke', tintOf(name));
   const start = {tests: 0, edges: 0,
     seconds: Math.min(points[0].seconds, d3.sum(preparation, (name) => report.seconds[name]))};
   if (overTime && start.seconds > 0) draw([{tests: 0, edges: 0, seconds: 0}, start], 'preparation');
@@ -1193,7 +1197,7 @@ function showCost() {
   for (const [name, seconds, tint] of parts) {
     if (tint && seconds > 0) {
       byId('time-bar').append(element('div', {title: `${name}: ${duration(seconds)}`,
-        style: `flex: ${seconds / total} 0 0; background: var(--${tint})`}));
+        style: `flex: ${seconds / total} 0 0; background: ${tintOf(tint)}`}));
     }
   }
   const tints = ['preparation', ...stages];
