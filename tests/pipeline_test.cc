@@ -6,6 +6,7 @@
 #include <fstream>
 #include <limits>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -158,6 +159,25 @@ TEST(ImageVectorOptions, TheSeedAndEveryFieldButThePathsChangeTheKey) {
   EXPECT_EQ(ImageVectorOptions().Key(7),
             "descriptor 0, PCA 32, components 64, tolerance 0x1.4f8b588e368f1p-17, iterations 100, "
             "variance floor 0x1.a36e2eb1c432dp-14, seed 7, training 100000, features 1000, seed 7");
+}
+
+TEST(Strategies, DrawTheirOwnNumberOfImages) {
+  using Strategy = PipelineOptions::Strategy;
+  const auto draws = [](Strategy strategy, int num_retrieved_images) {
+    PipelineOptions options;
+    options.strategy = strategy;
+    options.num_retrieved_images = num_retrieved_images;
+    return DrawsPerImage(options, 1000);
+  };
+  for (const Strategy loop : {Strategy::kGraphMatch, Strategy::kSampling, Strategy::kPropagation}) {
+    EXPECT_EQ(draws(loop, 0), 17);
+    EXPECT_EQ(draws(loop, 7), 17);
+  }
+  EXPECT_EQ(draws(Strategy::kRetrieval, 0), 120);
+  EXPECT_EQ(draws(Strategy::kRetrieval, 7), 7);
+  EXPECT_EQ(draws(Strategy::kBriad, 0), 40);
+  EXPECT_EQ(draws(Strategy::kBriad, 7), 7);
+  EXPECT_THROW(draws(Strategy::kExhaustive, 0), std::logic_error);
 }
 
 // With other words the seeds of earlier runs would no longer be found.

@@ -33,7 +33,7 @@ std::string FormatCost(const VerificationCost& cost) {
   if (cost.num_matched > 0) {
     text += fmt::format(
         "Exact matching     {} pairs in {} of CPU time, {:.3f} image reads a pair\n",
-        cost.num_matched, FormatDuration(cost.matching_seconds),
+        cost.num_matched, FormatDuration(cost.descriptor_matching_seconds),
         static_cast<double>(cost.num_image_reads) / static_cast<double>(cost.num_matched));
   }
   if (cost.num_fitted > 0) {
@@ -41,7 +41,7 @@ std::string FormatCost(const VerificationCost& cost) {
         fmt::format("Fits               {} pairs in {} of CPU time, {} settled without COLMAP\n",
                     cost.num_fitted, FormatDuration(cost.fit_seconds), cost.num_settled);
   }
-  const double all = cost.matching_seconds + cost.fit_seconds + cost.colmap_seconds;
+  const double all = cost.descriptor_matching_seconds + cost.fit_seconds + cost.colmap_seconds;
   const bool is_native = cost.num_fitted > 0 && cost.colmap_seconds == 0;
   if (all > 0 && !is_native) {
     text += fmt::format(

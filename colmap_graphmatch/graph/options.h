@@ -17,7 +17,8 @@ struct GraphMatchOptions {
   // reach it. At least 1. Fewer saves tests in dense collections and thins the graph there.
   int max_num_neighbors = 120;
 
-  // Images that each neighbour of an image hands on to it in one iteration. At least 0.
+  // Tests that propagation makes along an edge in one iteration, in each direction: so many of the
+  // neighbours of B, at most, are tested with A for every edge (A, B). At least 0.
   int num_to_propagate = 4;
 
   // Tests that sampling may spend on one image, over all iterations. 0: max(min(0.017 N, 120), 10)
@@ -40,7 +41,9 @@ struct GraphMatchOptions {
   // floor(MaxTestsForSampling / number_sample_iterations), at least 1 as long as the budget lasts.
   int TestsInIteration(int iteration, std::size_t num_images) const;
 
-  // Names the values of all fields: equal for equal options alone.
+  // Names the values of all fields: equal for equal options alone. The state files of users keep
+  // seeds under it, and under another key they are not found. So a new field is written only where
+  // it differs from its default: what earlier versions wrote stays valid.
   std::string Key() const;
 
   // Throws OptionsError.

@@ -13,15 +13,6 @@
 namespace colmap_graphmatch {
 namespace {
 
-// What the strategy draws for each image if nothing matches.
-RetrievalOptions DrawsOf(const PipelineOptions& options, std::size_t num_images) {
-  RetrievalOptions draws = RetrievalOptionsOf(options);
-  if (IsLoop(options.strategy)) {
-    draws.num_images = LoopOptionsOf(options).MaxTestsForSampling(num_images);
-  }
-  return draws;
-}
-
 RankedImages RankImages(RunSetup& setup, const std::vector<VerifiedPair>& known) {
   ImageRanker ranker = setup.MakeRanker();
   const VectorModel model = ranker.Learn(known);
@@ -47,7 +38,8 @@ CandidateList FindCandidates(const PipelineOptions& options, const StopRequest& 
   const std::vector<VerifiedPair> known = setup.database->ReadVerifiedPairs(
       static_cast<std::size_t>(options.verification.geometry.min_num_inliers));
   const RankedImages ranked = RankImages(setup, known);
-  RetrievalOptions draws = DrawsOf(options, ranked.images.size());
+  RetrievalOptions draws;
+  draws.num_images = DrawsPerImage(options, ranked.images.size());
   draws.restrictions = setup.RestrictionsOf(ranked.images);
 
   CandidateList list;

@@ -11,7 +11,6 @@
 #include "colmap_graphmatch/files/pair_log.h"
 #include "colmap_graphmatch/graph/explorer.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
-#include "colmap_graphmatch/graph/listed_pairs.h"
 #include "colmap_graphmatch/pipeline/budgeted_verifier.h"
 #include "colmap_graphmatch/pipeline/details_recorder.h"
 #include "colmap_graphmatch/pipeline/run_setup.h"
@@ -76,15 +75,14 @@ class Pipeline {
       ranked_ = ranker_.Rank(ranker_.Encode(model));
     }
     Explore();
-    return Report();
+    return Conclude();
   }
 
  private:
   void Open();
   void Explore();
-  PipelineResult Report();
+  PipelineResult Conclude();
 
-  std::unique_ptr<PairProposer> MakeProposer();
   // Which of the known pairs join the graph; what the loop starts from is kept for later runs.
   KnownPairsPolicy ChooseKnown();
   BudgetedVerifier::Order OrderOfTests() const;
@@ -121,7 +119,9 @@ void Pipeline::Explore() {
       verification_->Verifier(), options_.budget, setup_.threads.NumThreads(),
       [this] { return Seconds(); }, OrderOfTests());
   result_.matching = Timed(&result_.matching_seconds, [&] {
-    const std::unique_ptr<PairProposer> proposer = MakeProposer();
+    const std::unique_ptr<PairProposer> proposer = MakeProposer(
+        options_,
+        {ids_, restrictions_, setup_.listed_pairs, ranked_.ranking.get(), setup_.threads});
     return colmap_graphmatch::Explore(
         *proposer, ids_, budgeted, [this](const LoopProgress& progress) { OnProgress(progress); },
         ChooseKnown());
@@ -129,7 +129,7 @@ void Pipeline::Explore() {
   if (!result_.matching.finished) result_.stopped_by = StoppedByOf(budgeted.Reached());
 }
 
-PipelineResult Pipeline::Report() {
+PipelineResult Pipeline::Conclude() {
   if (options_.keep_details) result_.details = Details();
   result_.cost = verification_->Cost();
   verification_->Finish();
@@ -143,14 +143,6 @@ PipelineResult Pipeline::Report() {
   result_.preprocessing_seconds = ranker_.Seconds();
   result_.total_seconds = total_.Seconds();
   return std::move(result_);
-}
-
-std::unique_ptr<PairProposer> Pipeline::MakeProposer() {
-  if (options_.RanksImages()) {
-    return MakeRankingProposer(options_, restrictions_, *ranked_.ranking, setup_.threads);
-  }
-  if (options_.match_list_path.empty()) return std::make_unique<AllPairsProposer>(restrictions_);
-  return std::make_unique<ListedPairsProposer>(setup_.listed_pairs, ids_, restrictions_);
 }
 
 KnownPairsPolicy Pipeline::ChooseKnown() {

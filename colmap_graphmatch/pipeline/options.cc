@@ -10,6 +10,21 @@ void TestBudget::Check() const {
   if (!(max_minutes >= 0)) throw OptionsError("max_minutes must be at least 0.");
 }
 
+bool PipelineOptions::RanksImages() const {
+  if (!match_list_path.empty()) return false;
+  switch (strategy) {
+    case Strategy::kGraphMatch:
+    case Strategy::kSampling:
+    case Strategy::kPropagation:
+    case Strategy::kRetrieval:
+    case Strategy::kBriad:
+      return true;
+    case Strategy::kExhaustive:
+      break;
+  }
+  return false;
+}
+
 void PipelineOptions::Check() const {
   if (!match_list_path.empty() && strategy != Strategy::kGraphMatch) {
     throw OptionsError(

@@ -30,6 +30,7 @@ struct PipelineOptions {
   // propagation. kPropagation: the loop with its first sampling alone. kRetrieval: the nearest
   // images of each. kBriad: the same and then num_expansions rounds of query expansion.
   // kExhaustive: all.
+  // (pipeline/strategy.h says what makes a new one.)
   enum class Strategy { kGraphMatch, kSampling, kPropagation, kRetrieval, kBriad, kExhaustive };
   Strategy strategy = Strategy::kGraphMatch;
 
@@ -83,7 +84,7 @@ struct PipelineOptions {
   std::filesystem::path pair_log_path;
 
   // Whether images are ranked: not where all pairs are tested, or those of a list.
-  bool RanksImages() const { return match_list_path.empty() && strategy != Strategy::kExhaustive; }
+  bool RanksImages() const;
 
   // Throws OptionsError.
   void Check() const;

@@ -45,15 +45,15 @@ struct RunDetails {
 
 // What verification took.
 struct VerificationCost {
-  double matching_seconds = 0;      // CPU time of matching descriptors here, summed over threads.
-  std::size_t num_matched = 0;      // Pairs whose descriptors were matched here.
-  std::size_t num_image_reads = 0;  // For that.
-  double fit_seconds = 0;           // CPU time of fits before or instead of COLMAP, over threads.
-  std::size_t num_fitted = 0;       // Pairs,
-  std::size_t num_settled = 0;      // and those of them that COLMAP did not get.
-  double colmap_seconds = 0;        // In which COLMAP ran, summed over processes.
-  std::size_t num_verified = 0;     // Pairs, by COLMAP.
-  std::size_t num_failed = 0;       // Pairs on which the geometric verification failed.
+  double descriptor_matching_seconds = 0;  // CPU time here, summed over threads.
+  std::size_t num_matched = 0;             // Pairs whose descriptors were matched here.
+  std::size_t num_image_reads = 0;         // For that.
+  double fit_seconds = 0;        // CPU time of fits before or instead of COLMAP, over threads.
+  std::size_t num_fitted = 0;    // Pairs,
+  std::size_t num_settled = 0;   // and those of them that COLMAP did not get.
+  double colmap_seconds = 0;     // In which COLMAP ran, summed over processes.
+  std::size_t num_verified = 0;  // Pairs, by COLMAP.
+  std::size_t num_failed = 0;    // Pairs on which the geometric verification failed.
 };
 
 // What verification would have taken that was replayed.

@@ -66,7 +66,7 @@ class ByMatching : public RunVerification {
     const FitStatistics fits = geometry_.Fits();
     const ColmapVerifier::Statistics colmap = geometry_.Colmap();
     VerificationCost cost;
-    cost.matching_seconds = matching.seconds;
+    cost.descriptor_matching_seconds = matching.seconds;
     cost.num_matched = matching.num_matched;
     cost.num_image_reads = matching.num_image_reads;
     cost.fit_seconds = fits.seconds;

@@ -1,35 +1,78 @@
 #include "colmap_graphmatch/pipeline/strategy.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/listed_pairs.h"
 
 namespace colmap_graphmatch {
 
 using Strategy = PipelineOptions::Strategy;
 
 bool IsLoop(Strategy strategy) {
-  return strategy == Strategy::kGraphMatch || strategy == Strategy::kSampling ||
-         strategy == Strategy::kPropagation;
+  switch (strategy) {
+    case Strategy::kGraphMatch:
+    case Strategy::kSampling:
+    case Strategy::kPropagation:
+      return true;
+    case Strategy::kRetrieval:
+    case Strategy::kBriad:
+    case Strategy::kExhaustive:
+      break;
+  }
+  return false;
 }
 
 GraphMatchOptions LoopOptionsOf(const PipelineOptions& options) {
   GraphMatchOptions graph = options.graph;
-  if (options.strategy == Strategy::kSampling) graph.num_to_propagate = 0;
-  if (options.strategy == Strategy::kPropagation) {
-    graph.number_sample_iterations = std::min(graph.number_sample_iterations, 1);
+  switch (options.strategy) {
+    case Strategy::kSampling:
+      graph.num_to_propagate = 0;
+      break;
+    case Strategy::kPropagation:
+      graph.number_sample_iterations = std::min(graph.number_sample_iterations, 1);
+      break;
+    case Strategy::kGraphMatch:
+    case Strategy::kRetrieval:
+    case Strategy::kBriad:
+    case Strategy::kExhaustive:
+      break;
   }
   return graph;
 }
 
 RetrievalOptions RetrievalOptionsOf(const PipelineOptions& options) {
-  const bool expands = options.strategy == Strategy::kBriad;
   RetrievalOptions retrieval;
-  retrieval.num_images = options.num_retrieved_images > 0 ? options.num_retrieved_images
-                         : expands                        ? 40
-                                                          : 120;
-  retrieval.num_expansions = expands ? options.num_expansions : 0;
+  switch (options.strategy) {
+    case Strategy::kBriad:
+      retrieval.num_images = 40;
+      retrieval.num_expansions = options.num_expansions;
+      break;
+    case Strategy::kGraphMatch:
+    case Strategy::kSampling:
+    case Strategy::kPropagation:
+    case Strategy::kRetrieval:
+    case Strategy::kExhaustive:
+      break;
+  }
+  if (options.num_retrieved_images > 0) retrieval.num_images = options.num_retrieved_images;
   return retrieval;
+}
+
+int DrawsPerImage(const PipelineOptions& options, std::size_t num_images) {
+  switch (options.strategy) {
+    case Strategy::kGraphMatch:
+    case Strategy::kSampling:
+    case Strategy::kPropagation:
+      return LoopOptionsOf(options).MaxTestsForSampling(num_images);
+    case Strategy::kRetrieval:
+    case Strategy::kBriad:
+      return RetrievalOptionsOf(options).num_images;
+    case Strategy::kExhaustive:
+      break;
+  }
+  throw std::logic_error("A strategy that ranks no images draws none.");
 }
 
 std::string LoopKey(const PipelineOptions& options, const PairRestrictions& restrictions) {
@@ -39,17 +82,30 @@ std::string LoopKey(const PipelineOptions& options, const PairRestrictions& rest
          std::to_string(options.verification.geometry.min_num_inliers);
 }
 
-std::unique_ptr<PairProposer> MakeRankingProposer(const PipelineOptions& options,
-                                                  const PairRestrictions& restrictions,
-                                                  const Ranking& ranking, ThreadPool& threads) {
-  if (IsLoop(options.strategy)) {
-    GraphMatchOptions graph = LoopOptionsOf(options);
-    graph.restrictions = restrictions;
-    return std::make_unique<GraphMatchProposer>(graph, ranking, threads);
+std::unique_ptr<PairProposer> MakeProposer(const PipelineOptions& options,
+                                           const ProposerInput& input) {
+  if (!options.match_list_path.empty()) {
+    return std::make_unique<ListedPairsProposer>(input.listed_pairs, input.image_ids,
+                                                 input.restrictions);
   }
-  RetrievalOptions retrieval = RetrievalOptionsOf(options);
-  retrieval.restrictions = restrictions;
-  return std::make_unique<RetrievalProposer>(retrieval, ranking, threads);
+  switch (options.strategy) {
+    case Strategy::kGraphMatch:
+    case Strategy::kSampling:
+    case Strategy::kPropagation: {
+      GraphMatchOptions graph = LoopOptionsOf(options);
+      graph.restrictions = input.restrictions;
+      return std::make_unique<GraphMatchProposer>(graph, *input.ranking, input.threads);
+    }
+    case Strategy::kRetrieval:
+    case Strategy::kBriad: {
+      RetrievalOptions retrieval = RetrievalOptionsOf(options);
+      retrieval.restrictions = input.restrictions;
+      return std::make_unique<RetrievalProposer>(retrieval, *input.ranking, input.threads);
+    }
+    case Strategy::kExhaustive:
+      return std::make_unique<AllPairsProposer>(input.restrictions);
+  }
+  throw std::logic_error("There is no such strategy.");
 }
 
 }  // namespace colmap_graphmatch

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,8 +16,9 @@
 
 namespace colmap_graphmatch {
 
-// The strategies that users choose from, as proposers of pairs. A new one is a proposer of its own
-// and an entry here.
+// The strategies that users choose from, as proposers of pairs. A new one is a proposer in graph/,
+// a value of PipelineOptions::Strategy with its word (pipeline/options.h), and a case in the
+// switches over it: those of strategy.cc, and PipelineOptions::RanksImages.
 
 // Whether the strategy samples and propagates: then it starts from seeds.
 bool IsLoop(PipelineOptions::Strategy strategy);
@@ -24,15 +26,27 @@ bool IsLoop(PipelineOptions::Strategy strategy);
 // The loop that the options come to; with a strategy that is no loop, of the paper.
 GraphMatchOptions LoopOptionsOf(const PipelineOptions& options);
 
+// The retrieval that the options come to; with a strategy that does not retrieve, of kRetrieval.
 RetrievalOptions RetrievalOptionsOf(const PipelineOptions& options);
+
+// The images of its ranked list that a strategy that ranks images tests with each of num_images
+// images if nothing matches.
+int DrawsPerImage(const PipelineOptions& options, std::size_t num_images);
 
 // What the seeds of the loop depend on, apart from the images and their vectors.
 std::string LoopKey(const PipelineOptions& options, const PairRestrictions& restrictions);
 
-// Of a strategy that ranks images: vertices are those of the ranking. ranking and threads must
-// outlive it.
-std::unique_ptr<PairProposer> MakeRankingProposer(const PipelineOptions& options,
-                                                  const PairRestrictions& restrictions,
-                                                  const Ranking& ranking, ThreadPool& threads);
+// What a proposer goes by, besides the options.
+struct ProposerInput {
+  const std::vector<ImageId>& image_ids;       // By vertex, ascending.
+  const PairRestrictions& restrictions;        // By vertex.
+  const std::vector<ImagePair>& listed_pairs;  // Those of match_list_path.
+  const Ranking* ranking;                      // Of the vertices; null unless images are ranked.
+  ThreadPool& threads;
+};
+
+// The proposer of a run. ranking and threads must outlive it.
+std::unique_ptr<PairProposer> MakeProposer(const PipelineOptions& options,
+                                           const ProposerInput& input);
 
 }  // namespace colmap_graphmatch

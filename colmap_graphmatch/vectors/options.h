@@ -37,7 +37,9 @@ struct ImageVectorOptions {
   int max_num_features = 1000;
 
   // Names the seed and the values of all fields but the paths: their contents count, not where they
-  // are.
+  // are. The state files of users keep mixture and vectors under it, and under another key all are
+  // made anew. So a new field is written only where it differs from its default: what earlier
+  // versions wrote stays valid.
   std::string Key(std::uint64_t seed) const;
 
   // Throws OptionsError.
