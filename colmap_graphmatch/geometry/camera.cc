@@ -8,6 +8,7 @@
 namespace colmap_graphmatch {
 namespace {
 
+// -Wswitch asks for a new model wherever models differ.
 enum ModelId : int {
   kSimplePinhole = 0,
   kPinhole = 1,
@@ -30,25 +31,33 @@ enum ModelId : int {
 };
 
 constexpr std::array<CameraModel, 18> kModels = {{
-    {kSimplePinhole, "SIMPLE_PINHOLE", 1, 3, Projection::kPinhole},
-    {kPinhole, "PINHOLE", 2, 4, Projection::kPinhole},
-    {kSimpleRadial, "SIMPLE_RADIAL", 1, 4, Projection::kPinhole},
-    {kRadial, "RADIAL", 1, 5, Projection::kPinhole},
-    {kOpenCv, "OPENCV", 2, 8, Projection::kPinhole},
+    {kSimplePinhole, "SIMPLE_PINHOLE", 1, 3, Projection::kPerspective},
+    {kPinhole, "PINHOLE", 2, 4, Projection::kPerspective},
+    {kSimpleRadial, "SIMPLE_RADIAL", 1, 4, Projection::kPerspective},
+    {kRadial, "RADIAL", 1, 5, Projection::kPerspective},
+    {kOpenCv, "OPENCV", 2, 8, Projection::kPerspective},
     {kOpenCvFisheye, "OPENCV_FISHEYE", 2, 8, Projection::kFisheye},
-    {kFullOpenCv, "FULL_OPENCV", 2, 12, Projection::kPinhole},
-    {kFov, "FOV", 2, 5, Projection::kClosed},
+    {kFullOpenCv, "FULL_OPENCV", 2, 12, Projection::kPerspective},
+    {kFov, "FOV", 2, 5, Projection::kOwnFormula},
     {kSimpleRadialFisheye, "SIMPLE_RADIAL_FISHEYE", 1, 4, Projection::kFisheye},
     {kRadialFisheye, "RADIAL_FISHEYE", 1, 5, Projection::kFisheye},
     {kThinPrismFisheye, "THIN_PRISM_FISHEYE", 2, 12, Projection::kFisheye},
     {kRadTanThinPrismFisheye, "RAD_TAN_THIN_PRISM_FISHEYE", 2, 16, Projection::kFisheye},
-    {kSimpleDivision, "SIMPLE_DIVISION", 1, 4, Projection::kClosed},
-    {kDivision, "DIVISION", 2, 5, Projection::kClosed},
+    {kSimpleDivision, "SIMPLE_DIVISION", 1, 4, Projection::kOwnFormula},
+    {kDivision, "DIVISION", 2, 5, Projection::kOwnFormula},
     {kSimpleFisheye, "SIMPLE_FISHEYE", 1, 3, Projection::kFisheye},
     {kFisheye, "FISHEYE", 2, 4, Projection::kFisheye},
-    {kEucm, "EUCM", 2, 6, Projection::kClosed},
+    {kEucm, "EUCM", 2, 6, Projection::kOwnFormula},
     {kEquirectangular, "EQUIRECTANGULAR", 0, 2, Projection::kSpherical},
 }};
+
+constexpr bool RowsAreIds() {
+  for (std::size_t i = 0; i < kModels.size(); ++i) {
+    if (kModels[i].id != static_cast<int>(i)) return false;
+  }
+  return true;
+}
+static_assert(RowsAreIds(), "A model is found by its id as the row.");
 
 struct Point {
   double u;
@@ -70,7 +79,7 @@ Point Tangential(double p, double q, Point at) {
 }
 
 // The point with its distortion; extra: the parameters after the principal point.
-Point Distorted(int model, const double* extra, Point at) {
+Point Distorted(ModelId model, const double* extra, Point at) {
   const double squared_radius = at.u * at.u + at.v * at.v;
   const auto scaled = [&](double more) { return Point{at.u * (1 + more), at.v * (1 + more)}; };
   switch (model) {
@@ -104,20 +113,31 @@ Point Distorted(int model, const double* extra, Point at) {
     case kRadTanThinPrismFisheye: {
       // What follows the radial distortion is a function of the point that it gives.
       const Point radial = scaled(Radial(extra, 6, squared_radius));
+      // p0 and p1 of this model are what p2 and p1 are in OPENCV: COLMAP has them in this order.
       const Point tangential = Tangential(extra[7], extra[6], radial);
       const double square = radial.u * radial.u + radial.v * radial.v;
       return {radial.u + tangential.u + Radial(extra + 8, 2, square),
               radial.v + tangential.v + Radial(extra + 10, 2, square)};
     }
-    default:
-      return at;  // A model without distortion.
+    case kSimplePinhole:
+    case kPinhole:
+    case kSimpleFisheye:
+    case kFisheye:
+      return at;  // They have no distortion.
+    case kFov:
+    case kSimpleDivision:
+    case kDivision:
+    case kEucm:
+    case kEquirectangular:
+      break;  // They do not come here.
   }
+  return at;
 }
 
 // What Distorted gives `target` for: Newton's steps, no longer than a tenth of the point's radius
 // (or a tenth), derivatives by differences. As COLMAP does it, so that the same of several
 // solutions is found.
-bool Undistort(int model, const double* extra, Point target, Point* result) {
+bool Undistort(ModelId model, const double* extra, Point target, Point* result) {
   constexpr int kMaxSteps = 100;
   constexpr double kStepRadius = 0.1;
   constexpr double kDifference = 1e-6;
@@ -188,37 +208,53 @@ double InverseFovFactor(double omega, double squared_radius) {
   return std::tan(radius * omega) / (radius * 2 * tangent);
 }
 
-// By a formula, to the plane and from it. Not finite: there is no such point.
-Point ClosedToPlane(int model, const double* extra, Point at) {
-  const double squared_radius = at.u * at.u + at.v * at.v;
-  double factor = std::numeric_limits<double>::quiet_NaN();
-  if (model == kFov) {
-    factor = InverseFovFactor(extra[0], squared_radius);
-  } else if (model == kEucm) {
-    const double alpha = extra[0];
-    const double beta = extra[1];
-    const double radicand = 1 - (2 * alpha - 1) * beta * squared_radius;
-    const double numerator = 1 - alpha * alpha * beta * squared_radius;
-    const double depth = numerator / (alpha * std::sqrt(radicand) + 1 - alpha);
-    if (depth > 0) factor = 1 / depth;
-  } else {
-    const double depth = 1 + extra[0] * squared_radius;
-    if (depth > 0) factor = 1 / depth;
+enum class Way { kToPlane, kFromPlane };
+
+// What a model with a formula of its own multiplies u and v by. Not finite: there is no such point.
+double FormulaFactor(ModelId model, Way way, const double* extra, double squared_radius) {
+  constexpr double kNoPoint = std::numeric_limits<double>::quiet_NaN();
+  switch (model) {
+    case kFov:
+      return way == Way::kToPlane ? InverseFovFactor(extra[0], squared_radius)
+                                  : FovFactor(extra[0], squared_radius);
+    case kSimpleDivision:
+    case kDivision: {
+      if (way == Way::kFromPlane) return 2 / (1 + std::sqrt(1 - 4 * squared_radius * extra[0]));
+      const double depth = 1 + extra[0] * squared_radius;
+      return depth > 0 ? 1 / depth : kNoPoint;
+    }
+    case kEucm: {
+      const double alpha = extra[0];
+      const double beta = extra[1];
+      double depth = alpha * std::sqrt(beta * squared_radius + 1) + 1 - alpha;
+      if (way == Way::kToPlane) {
+        const double radicand = 1 - (2 * alpha - 1) * beta * squared_radius;
+        const double numerator = 1 - alpha * alpha * beta * squared_radius;
+        depth = numerator / (alpha * std::sqrt(radicand) + 1 - alpha);
+      }
+      return depth > 0 ? 1 / depth : kNoPoint;
+    }
+    case kSimplePinhole:
+    case kPinhole:
+    case kSimpleRadial:
+    case kRadial:
+    case kOpenCv:
+    case kOpenCvFisheye:
+    case kFullOpenCv:
+    case kSimpleRadialFisheye:
+    case kRadialFisheye:
+    case kThinPrismFisheye:
+    case kRadTanThinPrismFisheye:
+    case kSimpleFisheye:
+    case kFisheye:
+    case kEquirectangular:
+      break;  // They do not come here.
   }
-  return {at.u * factor, at.v * factor};
+  return kNoPoint;
 }
 
-Point ClosedFromPlane(int model, const double* extra, Point at) {
-  const double squared_radius = at.u * at.u + at.v * at.v;
-  double factor = std::numeric_limits<double>::quiet_NaN();
-  if (model == kFov) {
-    factor = FovFactor(extra[0], squared_radius);
-  } else if (model == kEucm) {
-    const double depth = extra[0] * std::sqrt(extra[1] * squared_radius + 1) + 1 - extra[0];
-    if (depth > 0) factor = 1 / depth;
-  } else {
-    factor = 2 / (1 + std::sqrt(1 - 4 * squared_radius * extra[0]));
-  }
+Point ByFormula(ModelId model, Way way, const double* extra, Point at) {
+  const double factor = FormulaFactor(model, way, extra, at.u * at.u + at.v * at.v);
   return {at.u * factor, at.v * factor};
 }
 
@@ -276,16 +312,16 @@ double MeanFocalLength(const Camera& camera) {
 
 bool ToNormalizedPlane(const Camera& camera, double x, double y, double* u, double* v) {
   const CameraModel& model = ModelOf(camera);
+  const auto id = static_cast<ModelId>(model.id);
   const PinholeParams pinhole = PinholePart(camera);
   const std::size_t num_pinhole = model.num_focal_lengths + 2;
   const double* extra = camera.params.data() + num_pinhole;
   Point at = {(x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy};
   if (!IsFinite(at)) return false;
-  if (model.projection == Projection::kClosed) {
-    at = ClosedToPlane(camera.model_id, extra, at);
+  if (model.projection == Projection::kOwnFormula) {
+    at = ByFormula(id, Way::kToPlane, extra, at);
   } else {
-    if (IsDistorting(extra, model.num_params - num_pinhole) &&
-        !Undistort(camera.model_id, extra, at, &at)) {
+    if (IsDistorting(extra, model.num_params - num_pinhole) && !Undistort(id, extra, at, &at)) {
       return false;
     }
     if (model.projection == Projection::kFisheye) {
@@ -302,18 +338,19 @@ bool ToNormalizedPlane(const Camera& camera, double x, double y, double* u, doub
 
 bool ToPixel(const Camera& camera, double u, double v, double* x, double* y) {
   const CameraModel& model = ModelOf(camera);
+  const auto id = static_cast<ModelId>(model.id);
   const PinholeParams pinhole = PinholePart(camera);
   const double* extra = camera.params.data() + model.num_focal_lengths + 2;
   Point at = {u, v};
-  if (model.projection == Projection::kClosed) {
-    at = ClosedFromPlane(camera.model_id, extra, at);
+  if (model.projection == Projection::kOwnFormula) {
+    at = ByFormula(id, Way::kFromPlane, extra, at);
   } else {
     if (model.projection == Projection::kFisheye) {
       const double radius = std::sqrt(u * u + v * v);
       const double factor = radius > 0 ? std::atan(radius) / radius : 1;
       at = {u * factor, v * factor};
     }
-    at = Distorted(camera.model_id, extra, at);
+    at = Distorted(id, extra, at);
   }
   *x = pinhole.fx * at.u + pinhole.cx;
   *y = pinhole.fy * at.v + pinhole.cy;

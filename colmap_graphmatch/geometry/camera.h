@@ -11,10 +11,10 @@ namespace colmap_graphmatch {
 
 // How a model takes a point (u, v, 1) to the plane that focal lengths and principal point scale.
 enum class Projection {
-  kPinhole,    // u and v, plus a distortion.
-  kFisheye,    // The angle to the axis in place of its tangent, plus a distortion.
-  kClosed,     // Both ways by a formula of its own.
-  kSpherical,  // It has no image plane: nothing here can judge it.
+  kPerspective,  // u and v, plus a distortion.
+  kFisheye,      // The angle to the axis in place of its tangent, plus a distortion.
+  kOwnFormula,   // By a formula of the model's own, which can be inverted.
+  kSpherical,    // It has no image plane: nothing here can judge it.
 };
 
 // The models of COLMAP 3.8 to 4.2 (src/colmap/sensor/models.h), with COLMAP's ids and order of

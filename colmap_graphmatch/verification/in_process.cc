@@ -48,7 +48,7 @@ bool CamerasOfImages::CanJudge(const ImagePair& pair) const {
   }
   // Later versions of COLMAP fit rays, not pixels, where lines in the image are bent.
   const auto is_straight = [](const Camera& camera) {
-    return FindCameraModel(camera.model_id)->projection == Projection::kPinhole;
+    return FindCameraModel(camera.model_id)->projection == Projection::kPerspective;
   };
   return (is_straight(*first) && is_straight(*second)) ||
          (first->has_prior_focal_length && second->has_prior_focal_length);
