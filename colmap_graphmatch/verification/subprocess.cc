@@ -137,9 +137,13 @@ SubprocessResult RunSubprocess(const std::vector<std::string>& command,
   std::error_code error;
   const auto start = [&] {
     const BlockedSignals signals;
-    // Not fork: to copy the tables of our memory takes as long as the start of COLMAP.
     return bp::child(
-        bp::posix::use_vfork, bp::exe = command.front(),
+// Not fork: to copy the tables of our memory takes as long as the start of COLMAP. ThreadSanitizer
+// makes a fork of it, and Boost would not learn then that a program cannot start.
+#ifndef __SANITIZE_THREAD__
+        bp::posix::use_vfork,
+#endif
+        bp::exe = command.front(),
         bp::args = std::vector<std::string>(command.begin() + 1, command.end()), environment,
         bp::std_in<bp::null, (bp::std_out & bp::std_err)> output_path.string(), group, error,
         bp::extend::on_exec_setup = [parent, &signals](auto&) {
