@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/stop_request.h"
@@ -21,6 +22,10 @@ struct ColmapInstallation {
   std::set<std::string> matcher_options;
 
   std::string Version() const;
+
+  // Whether min_inlier_ratio is more than a budget of trials: pairs with a smaller share of inliers
+  // are no edges.
+  bool RejectsByInlierRatio() const { return std::make_pair(major, minor) >= std::make_pair(4, 2); }
 
   // The spelling that this COLMAP has for an option of feature matching or geometric verification,
   // e.g. "TwoViewGeometry.max_error" for "max_error" or "SiftMatching.max_error", or for

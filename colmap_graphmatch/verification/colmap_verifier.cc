@@ -29,9 +29,6 @@ constexpr char kMatcherType[] = "FeatureMatching.type";
 // undefined.
 constexpr std::pair<int, int> kFirstDegenerate(4, 2);
 
-// The first version in which min_inlier_ratio is more than a budget of trials.
-constexpr std::pair<int, int> kFirstToReject(4, 2);
-
 // In the directory of a shard.
 std::filesystem::path ShardPath(const std::filesystem::path& directory) {
   return directory / "database.db";
@@ -93,9 +90,7 @@ std::vector<std::string> ColmapVerifier::ArgumentsForInliers(double share,
   GeometryOptions& geometry = options.geometry;
   geometry.max_num_trials =
       std::min(max_num_trials, geometry.max_num_trials.value_or(max_num_trials));
-  // From COLMAP 4.2 on pairs with a smaller share are rejected.
-  const bool is_budget = std::make_pair(colmap_.major, colmap_.minor) < kFirstToReject;
-  if (is_budget) geometry.min_inlier_ratio = share;
+  if (!colmap_.RejectsByInlierRatio()) geometry.min_inlier_ratio = share;
   std::vector<std::string> unknown;  // They were warned of.
   return colmap_.Arguments(ColmapOptions(options, plan_), &unknown);
 }
@@ -132,12 +127,13 @@ ColmapVerifier::Statistics ColmapVerifier::SoFar() const {
   return statistics_;
 }
 
-double ColmapVerifier::Timeout(std::size_t num_pairs) const {
+double ColmapVerifier::Timeout(std::size_t num_pairs, Trials trials) const {
   const double timeout = options_.timeout_per_pair * static_cast<double>(num_pairs + 1);
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (slowest_seconds_per_pair_ <= 0) return timeout;
-  return std::min(timeout, kMinTimeoutSeconds + kPatience * slowest_seconds_per_pair_ *
-                                                    static_cast<double>(num_pairs));
+  const double slowest = slowest_seconds_per_pair_[static_cast<std::size_t>(trials)];
+  if (slowest <= 0) return timeout;
+  return std::min(timeout,
+                  kMinTimeoutSeconds + kPatience * slowest * static_cast<double>(num_pairs));
 }
 
 std::map<ImageId, std::size_t> ColmapVerifier::NumFeatures(
@@ -205,7 +201,7 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<PairToVerify>& pairs, Tria
   const std::filesystem::path output_path = directory.Path() / "output.txt";
   const ShardFeatures features = MakeShard(directory.Path(), pairs);
   const SubprocessResult run = RunSubprocess(Command(directory.Path(), trials), output_path,
-                                             Timeout(pairs.size()), should_stop);
+                                             Timeout(pairs.size(), trials), should_stop);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     statistics_.seconds += run.seconds;
@@ -240,8 +236,8 @@ ShardOutcome ColmapVerifier::Verify(const std::vector<PairToVerify>& pairs, Tria
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   statistics_.num_verified += pairs.size();
-  slowest_seconds_per_pair_ =
-      std::max(slowest_seconds_per_pair_, run.seconds / static_cast<double>(pairs.size()));
+  double& slowest = slowest_seconds_per_pair_[static_cast<std::size_t>(trials)];
+  slowest = std::max(slowest, run.seconds / static_cast<double>(pairs.size()));
   return outcome;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -62,7 +63,7 @@ class ColmapVerifier : public GeometryVerifier {
                           const std::vector<PairToVerify>& pairs) const;
   // What verifies the shard in this directory.
   std::vector<std::string> Command(const std::filesystem::path& directory, Trials trials) const;
-  double Timeout(std::size_t num_pairs) const;
+  double Timeout(std::size_t num_pairs, Trials trials) const;
   std::map<ImageId, std::size_t> NumFeatures(const std::vector<PairToVerify>& pairs) const;
 
   VerificationOptions options_;
@@ -80,7 +81,7 @@ class ColmapVerifier : public GeometryVerifier {
 
   mutable std::mutex mutex_;  // Of what follows.
   Statistics statistics_;
-  double slowest_seconds_per_pair_ = 0;  // 0 until a shard came back.
+  std::array<double, 3> slowest_seconds_per_pair_ = {};  // By Trials; 0 until a shard came back.
 };
 
 }  // namespace colmap_graphmatch

@@ -20,7 +20,11 @@ VerificationPlan PlanVerification(const VerificationOptions& options, int num_th
   if (verifier == Verifier::kAuto) verifier = colmap ? Verifier::kScreened : Verifier::kNative;
   if (verifier == Verifier::kNative) plan.matches_here = true;
   plan.uses_gpu = gpu && !plan.matches_here;
-  const bool in_process = plan.matches_here && !NeedsColmap(options.geometry);
+  // What COLMAP is to reject by the share of all matches, it has to get with all of them.
+  const bool rejects =
+      colmap && colmap->RejectsByInlierRatio() && options.geometry.min_inlier_ratio.value_or(0) > 0;
+  const bool in_process = plan.matches_here && !NeedsColmap(options.geometry) &&
+                          !(rejects && verifier == Verifier::kScreened);
   plan.verifier = in_process ? verifier : Verifier::kColmap;
   num_threads = EffectiveNumThreads(num_threads);
   plan.num_processes = options.num_processes > 0 ? options.num_processes
