@@ -757,6 +757,30 @@ TEST_F(InProcessTest, WhatTheFitCannotJudgeGoesToColmapWhole) {
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("25 images have cameras")));
 }
 
+// What is settled here does not show that COLMAP works.
+TEST_F(InProcessTest, HopelessPairsDoNotHideThatColmapFails) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  for (ImageId image = 2; image <= 25; image += 2) Scatter(image, 0);
+  Set("FAKE_COLMAP_FAULT", "exit");
+  Set("FAKE_COLMAP_FAULT_PAIR", "all");
+  EXPECT_THROW(Verify(AllPairs(25)), ColmapError);
+}
+
+TEST_F(InProcessTest, WhatColmapRejectsByInlierRatioItGetsWhole) {
+  options_.verifier = VerificationOptions::Verifier::kScreened;
+  options_.geometry.min_inlier_ratio = 0.3;
+  ColmapInstallation colmap;
+  colmap.major = 4;
+  colmap.minor = 1;
+  EXPECT_EQ(PlanVerification(options_, 1, colmap).verifier,
+            VerificationOptions::Verifier::kScreened);
+  colmap.minor = 2;
+  EXPECT_EQ(PlanVerification(options_, 1, colmap).verifier, VerificationOptions::Verifier::kColmap);
+  options_.geometry.min_inlier_ratio = 0;
+  EXPECT_EQ(PlanVerification(options_, 1, colmap).verifier,
+            VerificationOptions::Verifier::kScreened);
+}
+
 TEST_F(InProcessTest, AutoIsScreenedWhereThereIsAColmap) {
   using Verifier = VerificationOptions::Verifier;
   options_ = VerificationOptions();

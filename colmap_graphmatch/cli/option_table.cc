@@ -263,9 +263,8 @@ void Table::AddWork() {
   Add("GraphMatching.num_processes", IntOf(&p.verification.num_processes, 0),
       "COLMAP processes at a time; 0: one a core without a GPU, else one");
   Add("GraphMatching.max_pairs_per_shard", IntOf(&p.verification.max_pairs_per_shard, 1),
-      "pairs (>= 1) that COLMAP gets at a time, after a fast fit four times as many; kill -9 loses "
-      "at "
-      "most so many verified pairs a process");
+      "pairs (>= 1) that COLMAP gets at a time; kill -9 loses at most so many verified pairs a "
+      "process");
   Add("GraphMatching.timeout_per_pair",
       DoubleOf(&p.verification.timeout_per_pair, Zero::kNotAllowed),
       "seconds (> 0) a pair after which COLMAP counts as hanging");

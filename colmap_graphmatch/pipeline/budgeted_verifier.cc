@@ -11,7 +11,7 @@ namespace {
 // so that chunks are large at first (images are read once a chunk) and small in the end,
 constexpr double kShareOfTimeLeft = 0.25;
 // but enough for every thread to have something to do.
-constexpr std::size_t kMinPairsPerThread = 16;
+constexpr std::size_t kMinPairsPerThread = 64;  // A shard at least.
 constexpr std::size_t kMaxChunk = 65536;
 
 }  // namespace

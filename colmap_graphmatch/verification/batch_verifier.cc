@@ -172,8 +172,7 @@ PairToVerify BatchVerifier::ReadPair(const ImagePair& pair) {
 
 void BatchVerifier::Work(const ShardRunner::Shard& shard, ShardRunner::Progress& progress) {
   const std::vector<PairToVerify> to_verify = Match(shard, progress);
-  const std::size_t size =
-      geometry_.SizeOfShards() * static_cast<std::size_t>(options_.max_pairs_per_shard);
+  const auto size = static_cast<std::size_t>(options_.max_pairs_per_shard);
   for (std::size_t first = 0; first < to_verify.size(); first += size) {
     if (first > 0 && stop_.Requested()) break;
     const auto begin = to_verify.begin() + static_cast<std::ptrdiff_t>(first);
@@ -215,10 +214,9 @@ std::deque<ShardRunner::Shard> BatchVerifier::Cut(
   // Shards are cut before known pairs are taken out: a run that goes on after an interruption then
   // gives COLMAP the same shards, and gets the same answers, as one that was never interrupted.
   std::deque<ShardRunner::Shard> shards;
-  const std::size_t factor =
-      geometry_.SizeOfShards() * (exact_matcher_ ? kPairsMatchedPerVerified : 1);
+  const std::size_t factor = exact_matcher_ ? kPairsMatchedPerVerified : 1;
   for (ShardRunner::Shard& shard :
-       CutIntoShards(pairs, factor * kMinPairsPerShard,
+       CutIntoShards(pairs, geometry_.LeastSizeOfShards() * factor * kMinPairsPerShard,
                      factor * static_cast<std::size_t>(options_.max_pairs_per_shard))) {
     const auto unknown_end = std::stable_partition(
         shard.begin(), shard.end(),

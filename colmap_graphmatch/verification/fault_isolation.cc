@@ -20,7 +20,7 @@ void VerifyAndIsolate(GeometryVerifier& verifier, const std::vector<PairToVerify
     ShardOutcome outcome = verifier.Verify(pairs, [&] { return progress.GivesUp(); });
     if (outcome.stopped) return;
     if (outcome.problem.empty()) {
-      progress.Finish({std::move(outcome.results), {}});
+      progress.Finish({std::move(outcome.results), {}, outcome.asked_colmap});
       return;
     }
     problem = std::move(outcome.problem);

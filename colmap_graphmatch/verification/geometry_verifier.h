@@ -25,6 +25,7 @@ struct ShardOutcome {
   std::vector<PairGeometry> results;  // Of all pairs, in their order, unless something was wrong:
   std::string problem;                // what, e.g. "ended with exit code 1"; empty if nothing did.
   bool stopped = false;               // should_stop ended it: neither results nor a problem.
+  bool asked_colmap = true;           // Else the results do not say whether COLMAP works.
 };
 
 // Finds the two-view geometries of the pairs of one shard: pairs with matches in, geometries out.
@@ -45,9 +46,9 @@ class GeometryVerifier {
   // For a pair with too few matches to be given to Verify.
   virtual TwoViewConfiguration ConfigurationOfUnmatched() const = 0;
 
-  // How many times as many pairs as COLMAP alone it should get at a time, so that they are worth a
+  // How many times as many pairs as COLMAP alone it should get at least, so that they are worth a
   // start of COLMAP.
-  virtual std::size_t SizeOfShards() const { return 1; }
+  virtual std::size_t LeastSizeOfShards() const { return 1; }
 
   // What a user is told who asks why it fails on everything; empty, or a sentence.
   virtual std::string AdviceOnFailure() const { return ""; }

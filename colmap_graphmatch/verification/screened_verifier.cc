@@ -125,6 +125,7 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
     }
     return true;
   };
+  outcome.asked_colmap = !(trimmed.pairs.empty() && close.pairs.empty() && whole.pairs.empty());
   using Trials = ColmapVerifier::Trials;
   if (ask_colmap(trimmed, Trials::kForMostInliers) && ask_colmap(close, Trials::kForHalfInliers) &&
       ask_colmap(whole, Trials::kAsAsked)) {

@@ -19,7 +19,7 @@ struct ShardPart {
 
   std::vector<PairGeometry> results;
   std::vector<Failure> failures;
-  bool is_verified = true;  // By a GeometryVerifier; else its pairs have too few matches.
+  bool is_verified = true;  // By a GeometryVerifier that may fail; else the pairs were hopeless.
 };
 
 // Has shards worked on by threads of its own, and hands what they finish to the calling thread, so

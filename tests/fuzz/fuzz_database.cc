@@ -82,7 +82,7 @@ class Fuzzer {
       Try([&] {
         std::filesystem::copy_file(Template(choice % kSchemas.size()), shard,
                                    std::filesystem::copy_options::overwrite_existing);
-        FillShard(shard, path_, 0, pairs, with_descriptors);
+        const ShardFeatures features = FillShard(shard, path_, 0, pairs, with_descriptors);
         std::map<ImageId, std::size_t> num_features;
         for (const ShardPair& pair : pairs) {
           num_features[pair.pair.id1] = 10;
@@ -90,7 +90,7 @@ class Fuzzer {
         }
         std::vector<ImagePair> asked;
         for (const ShardPair& pair : pairs) asked.push_back(pair.pair);
-        ReadShard(shard, asked, num_features, {});
+        ReadShard(shard, asked, num_features, features);
       });
     }
     PairGeometry result;
