@@ -42,6 +42,7 @@ class Random {
 enum class RandomStage : std::uint64_t {
   kTrainingSample = 1,
   kKMeans = 2,
+  kVocabulary = 3,
 };
 
 }  // namespace colmap_graphmatch

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <numeric>
 #include <utility>
 
 #include "colmap_graphmatch/ranking/dot_products.h"
+#include "colmap_graphmatch/ranking/nearest.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -13,25 +13,6 @@ namespace {
 // Vertices whose products with all others are computed at a time: the buffer is kBlockRows x N
 // floats a thread.
 constexpr std::size_t kBlockRows = 48;
-
-// The num_nearest others of `vertex`, given its products with all.
-std::vector<Vertex> Nearest(const float* products, std::size_t num_vertices, Vertex vertex,
-                            std::size_t num_nearest) {
-  std::vector<Vertex> order(num_vertices);
-  std::iota(order.begin(), order.end(), Vertex{0});
-  order.erase(order.begin() + static_cast<std::ptrdiff_t>(vertex));
-  const auto nearer = [products](Vertex a, Vertex b) {
-    return products[a] != products[b] ? products[a] > products[b] : a < b;
-  };
-  if (num_nearest < order.size()) {
-    const auto end = order.begin() + static_cast<std::ptrdiff_t>(num_nearest);
-    std::nth_element(order.begin(), end, order.end(), nearer);
-    order.erase(end, order.end());
-  }
-  std::sort(order.begin(), order.end(), nearer);
-  order.shrink_to_fit();
-  return order;
-}
 
 }  // namespace
 
