@@ -221,7 +221,7 @@ class CheckpointTest : public ::testing::Test {
     return mixture;
   }
 
-  static VectorModel Model(const GaussianMixture& mixture) { return {Pca(), mixture}; }
+  static VectorModel Model(const GaussianMixture& mixture) { return {Pca(), mixture, {}}; }
 
   // What the next run finds of a mixture that was kept with two vectors of three.
   bool IsFound(const GaussianMixture& mixture) {

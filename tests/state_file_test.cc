@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <numeric>
@@ -35,8 +36,22 @@ class StateFileTest : public ::testing::Test {
   void WriteAll() {
     StateFile state(database_path_, 1);
     state.WriteMixture("key", {1, 2, 3});
-    state.WriteVectors(images_, kDim, vectors_.data());
+    state.WriteVectors(images_, [this](std::size_t i) {
+      const auto* bytes = reinterpret_cast<const std::uint8_t*>(vectors_.data() + i * kDim);
+      return sqlite::Blob(bytes, bytes + kDim * sizeof(float));
+    });
     state.WriteSeeds("run", {ImagePair(1, 2), ImagePair(2, 3)});
+  }
+
+  // Those of `dim` entries, into vectors.
+  std::vector<bool> ReadVectors(StateFile& state, std::size_t dim,
+                                std::vector<float>* vectors) const {
+    return state.ReadVectors(images_,
+                             [&](std::size_t i, const std::uint8_t* data, std::size_t size) {
+                               if (size != dim * sizeof(float)) return false;
+                               std::memcpy(vectors->data() + i * dim, data, size);
+                               return true;
+                             });
   }
 
   void Execute(const std::string& sql) const {
@@ -54,7 +69,7 @@ class StateFileTest : public ::testing::Test {
     Found found;
     found.mixture = state.ReadMixture("key").has_value();
     std::vector<float> vectors(vectors_.size());
-    found.vectors = state.ReadVectors(images_, kDim, vectors.data());
+    found.vectors = ReadVectors(state, kDim, &vectors);
     for (std::size_t i = 0; i < vectors.size(); ++i) {
       EXPECT_EQ(vectors[i], found.vectors[i / kDim] ? vectors_[i] : 0);
     }
@@ -90,9 +105,8 @@ TEST_F(StateFileTest, GivesNothingForOtherKeysOrFeatures) {
   images_[1].features += 1;
   EXPECT_EQ(state.CountVectors(images_), 2U);
   std::vector<float> vectors(vectors_.size());
-  EXPECT_THAT(state.ReadVectors(images_, kDim, vectors.data()), ElementsAre(true, false, true));
-  EXPECT_THAT(state.ReadVectors(images_, kDim - 1, vectors.data()),
-              ElementsAre(false, false, false));
+  EXPECT_THAT(ReadVectors(state, kDim, &vectors), ElementsAre(true, false, true));
+  EXPECT_THAT(ReadVectors(state, kDim - 1, &vectors), ElementsAre(false, false, false));
 }
 
 TEST_F(StateFileTest, ANewMixtureDropsTheVectorsOfTheOldOne) {
@@ -117,7 +131,7 @@ TEST_F(StateFileTest, DropsVectorsOfImagesThatAreGone) {
   StateFile state(database_path_, 1);
   state.DropVectorsExcept({images_[0], images_[2], {99, 1}});
   std::vector<float> vectors(vectors_.size());
-  EXPECT_THAT(state.ReadVectors(images_, kDim, vectors.data()), ElementsAre(true, false, true));
+  EXPECT_THAT(ReadVectors(state, kDim, &vectors), ElementsAre(true, false, true));
 }
 
 TEST_F(StateFileTest, MadeAnewItStaysTheSameFileForThoseThatWait) {

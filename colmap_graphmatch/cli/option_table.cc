@@ -217,8 +217,9 @@ void Table::AddVectors() {
   ImageVectorOptions& vectors = ranking.vectors;
   Section("GraphMatch: how images are described");
   Add("GraphMatching.descriptor", OneOf(&vectors.descriptor, kDescriptorWords),
-      "what describes an image: Fisher vectors of its features; for comparison VLAD of them, GIST "
-      "of the photo, or vectors of another program from a file");
+      "what describes an image: Fisher vectors of its features, or visual words of all of them "
+      "(asmk: better lists, more time); for comparison VLAD, GIST of the photo, or vectors of "
+      "another program from a file");
   Add("image_path",
       TextOf(&vectors.image_path, "the path of a directory", OptionRow::Path::kDirectory),
       "the directory of the photos: to show them in the report, and for the descriptor gist")

@@ -121,7 +121,10 @@ std::string FormatTime(const PipelineOptions& options, const PipelineResult& res
   if (!options.RanksImages()) return text + "\n";
   const ImageRankingSeconds& seconds = result.preprocessing_seconds;
   text += " (";
-  if (seconds.mixture > 0) text += fmt::format("mixture {}, ", FormatDuration(seconds.mixture));
+  if (seconds.mixture > 0) {
+    text += fmt::format("{} {}, ", NameOfModel(options.ranking.vectors.descriptor),
+                        FormatDuration(seconds.mixture));
+  }
   if (options.ranking.ranking_path.empty()) {
     text += fmt::format("{} {}, ", NameOfVectors(options.ranking.vectors.descriptor),
                         FormatDuration(seconds.vectors));

@@ -7,7 +7,6 @@
 #include <array>
 #include <boost/crc.hpp>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <system_error>
 
@@ -251,31 +250,27 @@ std::size_t StateFile::CountVectors(const std::vector<ImageFingerprint>& images)
 }
 
 std::vector<bool> StateFile::ReadVectors(const std::vector<ImageFingerprint>& images,
-                                         std::size_t dim, float* vectors) {
+                                         const TakeVector& take) {
   std::vector<bool> found(images.size());
   sqlite::Statement select(
       connection_, "SELECT data, checksum FROM vectors WHERE image_id = ?1 AND features = ?2");
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (select.Bind(1, std::int64_t{images[i].id}).Bind(2, images[i].features).Step()) {
       const std::uint8_t* data = select.Data(0);
-      const std::size_t size = dim * sizeof(float);
-      if (select.Size(0) == size && Checksum(data, size) == select.Int(1)) {
-        std::memcpy(vectors + i * dim, data, size);
-        found[i] = true;
-      }
+      const std::size_t size = select.Size(0);
+      found[i] = Checksum(data, size) == select.Int(1) && take(i, data, size);
     }
     select.Reset();
   }
   return found;
 }
 
-void StateFile::WriteVectors(const std::vector<ImageFingerprint>& images, std::size_t dim,
-                             const float* vectors) {
+void StateFile::WriteVectors(const std::vector<ImageFingerprint>& images,
+                             const std::function<sqlite::Blob(std::size_t i)>& vector_of) {
   sqlite::Transaction transaction(connection_);
   sqlite::Statement insert(connection_, "INSERT OR REPLACE INTO vectors VALUES(?1, ?2, ?3, ?4)");
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const auto* bytes = reinterpret_cast<const std::uint8_t*>(vectors + i * dim);
-    const sqlite::Blob data(bytes, bytes + dim * sizeof(float));
+    const sqlite::Blob data = vector_of(i);
     insert.Bind(1, std::int64_t{images[i].id})
         .Bind(2, images[i].features)
         .Bind(3, Checksum(data.data(), data.size()))

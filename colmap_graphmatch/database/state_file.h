@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,8 +14,8 @@
 
 namespace colmap_graphmatch {
 
-// What a run keeps beside the user's database for the next one: the mixture, the Fisher vectors and
-// the seeds of the loop, in the file DATABASE.graphmatch (docs/formats.md). The file is held locked
+// What a run keeps beside the user's database for the next one: the model, the vectors and the
+// seeds of the loop, in the file DATABASE.graphmatch (docs/formats.md). The file is held locked
 // as long as the object lives, so that only one run works on a database at a time. Rows whose
 // checksum is wrong are as if they were not there.
 //
@@ -49,12 +50,13 @@ class StateFile {
 
   // How many of the images have a vector that was stored for the same features.
   std::size_t CountVectors(const std::vector<ImageFingerprint>& images);
-  // Fills the rows (dim floats each) of `vectors` of those images; true for each of them.
-  std::vector<bool> ReadVectors(const std::vector<ImageFingerprint>& images, std::size_t dim,
-                                float* vectors);
-  // vectors: a row of dim floats for each of the images.
-  void WriteVectors(const std::vector<ImageFingerprint>& images, std::size_t dim,
-                    const float* vectors);
+  // Hands out the vectors of those images, by their places; true for each that was taken.
+  using TakeVector = std::function<bool(std::size_t i, const std::uint8_t* data, std::size_t size)>;
+  std::vector<bool> ReadVectors(const std::vector<ImageFingerprint>& images,
+                                const TakeVector& take);
+  // vector_of(i): the bytes of the vector of image i.
+  void WriteVectors(const std::vector<ImageFingerprint>& images,
+                    const std::function<sqlite::Blob(std::size_t i)>& vector_of);
 
   // The seeds that were stored with the same key, ascending.
   std::optional<std::vector<ImagePair>> ReadSeeds(const std::string& key);

@@ -1,9 +1,11 @@
 #include "colmap_graphmatch/vectors/checkpoint.h"
 
 #include <boost/crc.hpp>
+#include <cstring>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/vectors/asmk_blobs.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -66,7 +68,8 @@ void Checkpoint::Select(const ImageVectorOptions& options, std::uint64_t seed,
     vectors_key_ = "GIST of " + photos_checksum;
     return;
   }
-  shape_ = {options.gmm.num_components, options.pca_dim};
+  shape_ = {options.gmm.num_components, options.pca_dim,
+            options.descriptor == ImageVectorOptions::Descriptor::kAsmk};
   vectors_key_ = options.Key(seed);
 }
 
@@ -103,19 +106,49 @@ void Checkpoint::KeepModel(const VectorModel& model) {
 
 std::vector<bool> Checkpoint::ReadVectors(std::size_t dim, float* vectors) {
   std::vector<bool> found(images_.size());
-  Try([&] { found = file_->ReadVectors(images_, dim, vectors); });
+  const auto take = [&](std::size_t i, const std::uint8_t* data, std::size_t size) {
+    if (size != dim * sizeof(float)) return false;
+    std::memcpy(vectors + i * dim, data, size);
+    return true;
+  };
+  Try([&] { found = file_->ReadVectors(images_, take); });
   return found;
 }
 
 void Checkpoint::KeepVectors(const std::vector<std::size_t>& which, std::size_t dim,
                              const float* vectors) {
+  Keep(which, [&](std::size_t i) {
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(vectors + i * dim);
+    return sqlite::Blob(bytes, bytes + dim * sizeof(float));
+  });
+}
+
+std::vector<bool> Checkpoint::ReadWords(std::size_t num_words, std::vector<VisualWords>* words) {
+  std::vector<bool> found(images_.size());
+  const auto take = [&](std::size_t i, const std::uint8_t* data, std::size_t size) {
+    std::optional<VisualWords> kept = DeserializeWords(data, size, num_words);
+    if (!kept) return false;
+    (*words)[i] = std::move(*kept);
+    return true;
+  };
+  Try([&] { found = file_->ReadVectors(images_, take); });
+  return found;
+}
+
+void Checkpoint::KeepWords(const std::vector<std::size_t>& which,
+                           const std::vector<VisualWords>& words) {
+  Keep(which, [&](std::size_t i) { return Serialize(words[i]); });
+}
+
+void Checkpoint::Keep(const std::vector<std::size_t>& which,
+                      const std::function<sqlite::Blob(std::size_t i)>& vector_of) {
   std::vector<ImageFingerprint> images;
   images.reserve(which.size());
   for (const std::size_t i : which) images.push_back(images_[i]);
   Try([&] {
     if (!dropped_others_) file_->DropVectorsExcept(images_);
     dropped_others_ = true;
-    file_->WriteVectors(images, dim, vectors);
+    file_->WriteVectors(images, vector_of);
   });
 }
 

@@ -11,6 +11,7 @@
 
 #include "colmap_graphmatch/base/messages.h"
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/base/visual_words.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/database/state_file.h"
 #include "colmap_graphmatch/vectors/options.h"
@@ -53,6 +54,11 @@ class Checkpoint {
   // vectors: a row for each of these images, given by their places among the selected ones.
   void KeepVectors(const std::vector<std::size_t>& which, std::size_t dim, const float* vectors);
 
+  // The same for visual words, all below num_words. words: as many as the selected images.
+  std::vector<bool> ReadWords(std::size_t num_words, std::vector<VisualWords>* words);
+  // words: of each of these images.
+  void KeepWords(const std::vector<std::size_t>& which, const std::vector<VisualWords>& words);
+
   // The seeds of the loop under the same images, model and loop_key; none if there are no such.
   std::vector<ImagePair> ReadSeeds(const std::string& loop_key);
   void KeepSeeds(const std::string& loop_key, const std::vector<ImagePair>& seeds);
@@ -60,6 +66,8 @@ class Checkpoint {
  private:
   // Runs it, if there is a file, which is made anew if it is damaged. Other errors end its use.
   void Try(const std::function<void()>& action);
+  void Keep(const std::vector<std::size_t>& which,
+            const std::function<sqlite::Blob(std::size_t i)>& vector_of);
   std::string SeedsKey(const std::string& loop_key) const;
 
   Messages messages_;

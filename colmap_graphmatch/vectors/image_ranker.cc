@@ -13,6 +13,7 @@
 #include "colmap_graphmatch/files/given_vectors.h"
 #include "colmap_graphmatch/files/ranked_lists.h"
 #include "colmap_graphmatch/files/text_file.h"
+#include "colmap_graphmatch/ranking/asmk_ranking.h"
 #include "colmap_graphmatch/vectors/image_vectors.h"
 
 namespace colmap_graphmatch {
@@ -23,6 +24,11 @@ constexpr std::size_t kImagesPerBlock = 2048;
 
 void Describe(const VectorModelTraining& training, const ImageVectorOptions& options,
               const Messages& messages) {
+  if (training.model.vocabulary.words.rows() > 0) {
+    messages.info("Learnt a vocabulary of " +
+                  std::to_string(training.model.vocabulary.words.rows()) + " visual words.");
+  }
+  if (!HasMixture(options.descriptor)) return;
   const auto num_components = training.model.mixture.NumComponents();
   if (num_components < options.gmm.num_components) {
     messages.warn("The images have too few different features for " +
@@ -32,6 +38,16 @@ void Describe(const VectorModelTraining& training, const ImageVectorOptions& opt
   messages.info("Learnt a mixture of " + std::to_string(num_components) + " Gaussians in " +
                 std::to_string(training.num_iterations) + " iterations of EM" +
                 (training.converged ? "" : " (not yet converged)") + ".");
+}
+
+void DescribeKept(const VectorModel& model, const Messages& messages) {
+  if (model.vocabulary.words.rows() > 0) {
+    messages.info("The vocabulary of " + std::to_string(model.vocabulary.words.rows()) +
+                  " visual words is that of the last run.");
+  } else if (model.mixture.NumComponents() > 0) {
+    messages.info("The mixture of " + std::to_string(model.mixture.NumComponents()) +
+                  " Gaussians is that of the last run.");
+  }
 }
 
 // Their pairs were tested with features that are gone; COLMAP itself keeps such pairs without a
@@ -94,6 +110,10 @@ bool ImageRanker::AreVectorsGiven() const {
   return options_.vectors.descriptor == ImageVectorOptions::Descriptor::kFile;
 }
 
+bool ImageRanker::UsesWords() const {
+  return options_.vectors.descriptor == ImageVectorOptions::Descriptor::kAsmk;
+}
+
 VectorModel ImageRanker::Learn(const std::vector<VerifiedPair>& known) {
   if (AreListsGiven() || AreVectorsGiven()) return {};
   SelectKept(known);
@@ -105,6 +125,10 @@ ImageVectors ImageRanker::Encode(const VectorModel& model) {
   if (AreVectorsGiven()) return ReadVectors();
   ImageVectors vectors;
   vectors.images = images_;
+  if (UsesWords()) {
+    vectors.words = Timed(&seconds_.vectors, [&] { return FindWords(model); });
+    return vectors;
+  }
   vectors.rows = Timed(&seconds_.vectors, [&] { return FindVectors(model); });
   vectors.dim = vectors.rows.size() / images_.size();
   if (!options_.export_path.empty()) Export(vectors);
@@ -115,7 +139,11 @@ RankedImages ImageRanker::Rank(ImageVectors vectors) {
   if (AreListsGiven()) return ReadLists();
   RankedImages ranked;
   ranked.images = std::move(vectors.images);
-  ranked.ranking = Timed(&seconds_.ranking, [&] {
+  ranked.ranking = Timed(&seconds_.ranking, [&]() -> std::unique_ptr<Ranking> {
+    if (UsesWords()) {
+      return std::make_unique<AsmkRanking>(RankingOptions(), std::move(vectors.words), threads_,
+                                           &stop_);
+    }
     return std::make_unique<VectorRanking>(RankingOptions(), ranked.images.size(), vectors.dim,
                                            std::move(vectors.rows), threads_, &stop_);
   });
@@ -132,18 +160,14 @@ void ImageRanker::SelectKept(const std::vector<VerifiedPair>& known) {
 
 // The model that earlier runs used, or a new one.
 VectorModel ImageRanker::FindModel() {
-  const bool has_mixture = HasMixture(options_.vectors.descriptor);
   std::optional<VectorModel> kept = checkpoint_.ReadModel();
   if (kept) {
-    if (has_mixture) {
-      messages_.info("The mixture of " + std::to_string(kept->mixture.NumComponents()) +
-                     " Gaussians is that of the last run.");
-    }
+    DescribeKept(*kept, messages_);
     return std::move(*kept);
   }
   VectorModelTraining training =
       LearnVectorModel(options_.vectors, seed_, database_, images_, threads_, stop_);
-  if (has_mixture) Describe(training, options_.vectors, messages_);
+  Describe(training, options_.vectors, messages_);
   checkpoint_.KeepModel(training.model);
   return std::move(training.model);
 }
@@ -154,6 +178,40 @@ std::vector<float> ImageRanker::FindVectors(const VectorModel& model) {
   const std::size_t dim = VectorDim(options_.vectors, model);
   std::vector<float> vectors(images_.size() * dim);
   const std::vector<bool> kept = checkpoint_.ReadVectors(dim, vectors.data());
+  ForEachBlockOfMissing(
+      kept, [&](const std::vector<ImageRecord>& records, const std::vector<std::size_t>& block) {
+        const std::vector<float> encoded =
+            EncodeImages(options_.vectors, model, database_, records, threads_, stop_);
+        for (std::size_t i = 0; i < block.size(); ++i) {
+          std::copy_n(encoded.begin() + static_cast<std::ptrdiff_t>(i * dim), dim,
+                      vectors.begin() + static_cast<std::ptrdiff_t>(block[i] * dim));
+        }
+        checkpoint_.KeepVectors(block, dim, encoded.data());
+      });
+  DescribeEncoding(std::string(NameOfVectors(options_.vectors.descriptor)) + " of " +
+                       std::to_string(dim) + " entries",
+                   kept);
+  return vectors;
+}
+
+// The same for visual words.
+std::vector<VisualWords> ImageRanker::FindWords(const VectorModel& model) {
+  std::vector<VisualWords> words(images_.size());
+  const std::vector<bool> kept =
+      checkpoint_.ReadWords(static_cast<std::size_t>(model.vocabulary.words.rows()), &words);
+  ForEachBlockOfMissing(
+      kept, [&](const std::vector<ImageRecord>& records, const std::vector<std::size_t>& block) {
+        std::vector<VisualWords> encoded =
+            EncodeImagesAsWords(model, database_, records, threads_, stop_);
+        checkpoint_.KeepWords(block, encoded);
+        for (std::size_t i = 0; i < block.size(); ++i) words[block[i]] = std::move(encoded[i]);
+      });
+  DescribeEncoding(NameOfVectors(options_.vectors.descriptor), kept);
+  return words;
+}
+
+void ImageRanker::ForEachBlockOfMissing(const std::vector<bool>& kept,
+                                        const MakeBlock& make) const {
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < images_.size(); ++i) {
     if (!kept[i]) missing.push_back(i);
@@ -166,22 +224,16 @@ std::vector<float> ImageRanker::FindVectors(const VectorModel& model) {
     std::vector<ImageRecord> records;
     records.reserve(block.size());
     for (const std::size_t i : block) records.push_back(images_[i]);
-    const std::vector<float> encoded =
-        EncodeImages(options_.vectors, model, database_, records, threads_, stop_);
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      std::copy_n(encoded.begin() + static_cast<std::ptrdiff_t>(i * dim), dim,
-                  vectors.begin() + static_cast<std::ptrdiff_t>(block[i] * dim));
-    }
-    checkpoint_.KeepVectors(block, dim, encoded.data());
+    make(records, block);
   }
-  const std::size_t num_kept = images_.size() - missing.size();
-  messages_.info(
-      "Described " + std::to_string(images_.size()) + " images by " +
-      NameOfVectors(options_.vectors.descriptor) + " of " + std::to_string(dim) + " entries" +
-      (num_kept == 0
-           ? "."
-           : "; those of " + std::to_string(num_kept) + " images are from the last run."));
-  return vectors;
+}
+
+void ImageRanker::DescribeEncoding(const std::string& what, const std::vector<bool>& kept) const {
+  const auto num_kept = std::count(kept.begin(), kept.end(), true);
+  messages_.info("Described " + std::to_string(images_.size()) + " images by " + what +
+                 (num_kept == 0 ? "."
+                                : "; those of " + std::to_string(num_kept) +
+                                      " images are from the last run."));
 }
 
 ImageVectors ImageRanker::ReadVectors() {
@@ -196,7 +248,7 @@ ImageVectors ImageRanker::ReadVectors() {
   messages_.info("Read " + std::to_string(given.images.size()) + " vectors of " +
                  std::to_string(given.dim) + " entries.");
   checkpoint_.SelectGiven("vectors " + given.checksum, fingerprints_);
-  return {std::move(given.images), given.dim, std::move(given.rows)};
+  return {std::move(given.images), given.dim, std::move(given.rows), {}};
 }
 
 RankedImages ImageRanker::ReadLists() {

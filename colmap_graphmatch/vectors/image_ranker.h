@@ -2,13 +2,16 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/base/messages.h"
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/base/verified_pair.h"
+#include "colmap_graphmatch/base/visual_words.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 #include "colmap_graphmatch/vectors/checkpoint.h"
@@ -18,11 +21,13 @@
 
 namespace colmap_graphmatch {
 
-// The images that have a vector, ascending by id, and a row of dim floats for each.
+// The images that have a vector, ascending by id, and a row of dim floats for each; for kAsmk
+// instead of it the visual words of each.
 struct ImageVectors {
   std::vector<ImageRecord> images;
   std::size_t dim = 0;
   std::vector<float> rows;
+  std::vector<VisualWords> words;
 };
 
 struct RankedImages {
@@ -57,10 +62,17 @@ class ImageRanker {
  private:
   bool AreListsGiven() const { return !options_.ranking_path.empty(); }
   bool AreVectorsGiven() const;
+  bool UsesWords() const;
 
   void SelectKept(const std::vector<VerifiedPair>& known);
   VectorModel FindModel();
   std::vector<float> FindVectors(const VectorModel& model);
+  std::vector<VisualWords> FindWords(const VectorModel& model);
+  // Calls make(records, places) for blocks of the images that were not kept.
+  using MakeBlock =
+      std::function<void(const std::vector<ImageRecord>&, const std::vector<std::size_t>&)>;
+  void ForEachBlockOfMissing(const std::vector<bool>& kept, const MakeBlock& make) const;
+  void DescribeEncoding(const std::string& what, const std::vector<bool>& kept) const;
   ImageVectors ReadVectors();
   RankedImages ReadLists();
   void Export(const ImageVectors& vectors) const;

@@ -11,6 +11,7 @@
 #include "colmap_graphmatch/encoding/descriptor_selection.h"
 #include "colmap_graphmatch/encoding/fisher_vector.h"
 #include "colmap_graphmatch/encoding/gist.h"
+#include "colmap_graphmatch/encoding/visual_word_encoder.h"
 #include "colmap_graphmatch/encoding/vlad.h"
 
 namespace colmap_graphmatch {
@@ -18,8 +19,10 @@ namespace {
 
 static_assert(kDescriptorDim == 128, "encoding/descriptor_selection.h is written for SIFT");
 
-// Images read at a time; twice as many are in memory, with the descriptors that are used.
+// Images read at a time, and descriptors of them that are used (32 MB), unless one image has more.
+// Twice as many are in memory.
 constexpr std::size_t kImagesPerChunk = 64;
+constexpr std::size_t kDescriptorsPerChunk = std::size_t{1} << 18;
 
 // The selected descriptors of an image, one after the other.
 struct SelectedDescriptors {
@@ -28,6 +31,7 @@ struct SelectedDescriptors {
 
   SelectedDescriptors(const Descriptors& all, const std::vector<std::size_t>& rows)
       : num(rows.size()), data(all.CopyRows(rows)) {}
+  explicit SelectedDescriptors(Descriptors all) : num(all.num_rows), data(std::move(all.data)) {}
 };
 
 // On a thread of its own, or, if the system gives none, when it is asked for.
@@ -47,36 +51,32 @@ void ForEachImage(const std::vector<ImageRecord>& images, ThreadPool& threads,
                   const StopRequest& stop, const Select& select, const Body& body) {
   const auto read_chunk = [&](std::size_t first) {
     std::vector<SelectedDescriptors> chunk;
+    std::size_t num_descriptors = 0;
     for (std::size_t i = first; i < std::min(first + kImagesPerChunk, images.size()); ++i) {
       chunk.push_back(select(images[i]));
+      num_descriptors += chunk.back().num;
+      if (num_descriptors >= kDescriptorsPerChunk) break;
     }
     return chunk;
   };
   std::vector<SelectedDescriptors> chunk = read_chunk(0);
-  for (std::size_t first = 0; first < images.size(); first += kImagesPerChunk) {
+  for (std::size_t first = 0; first < images.size();) {
     stop.ThrowIfRequested();
-    std::future<std::vector<SelectedDescriptors>> next =
-        Start([&] { return read_chunk(first + kImagesPerChunk); });
+    const std::size_t end = first + chunk.size();
+    std::future<std::vector<SelectedDescriptors>> next = Start([&] { return read_chunk(end); });
     threads.ParallelFor(chunk.size(), [&](std::size_t i) { body(first + i, chunk[i]); });
     chunk = next.get();
+    first = end;
   }
 }
 
-}  // namespace
-
-bool HasMixture(ImageVectorOptions::Descriptor descriptor) {
-  return descriptor == ImageVectorOptions::Descriptor::kFisher ||
-         descriptor == ImageVectorOptions::Descriptor::kVlad;
-}
-
-VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, std::uint64_t seed,
-                                     Database& database, const std::vector<ImageRecord>& images,
-                                     ThreadPool& threads, const StopRequest& stop) {
-  VectorModelTraining training;
-  if (!HasMixture(options.descriptor)) return training;
-  const std::size_t per_image =
-      (static_cast<std::size_t>(options.num_training_descriptors) + images.size() - 1) /
-      images.size();
+// The same number of every image's descriptors, drawn at random: num of them in all, or a few more,
+// in the units that convert makes of them.
+template <typename Convert>
+RowMatrixXf DrawSamples(int num, std::uint64_t seed, Database& database,
+                        const std::vector<ImageRecord>& images, ThreadPool& threads,
+                        const StopRequest& stop, const Convert& convert) {
+  const std::size_t per_image = (static_cast<std::size_t>(num) + images.size() - 1) / images.size();
   std::vector<Eigen::Index> first_rows = {0};
   for (const ImageRecord& image : images) {
     first_rows.push_back(first_rows.back() +
@@ -94,8 +94,32 @@ VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, std::uin
       },
       [&](std::size_t i, const SelectedDescriptors& selected) {
         samples.middleRows(first_rows[i], first_rows[i + 1] - first_rows[i]) =
-            DescriptorsToFloat(selected.data.data(), selected.num);
+            convert(selected.data.data(), selected.num);
       });
+  return samples;
+}
+
+}  // namespace
+
+bool HasMixture(ImageVectorOptions::Descriptor descriptor) {
+  return descriptor == ImageVectorOptions::Descriptor::kFisher ||
+         descriptor == ImageVectorOptions::Descriptor::kVlad;
+}
+
+VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, std::uint64_t seed,
+                                     Database& database, const std::vector<ImageRecord>& images,
+                                     ThreadPool& threads, const StopRequest& stop) {
+  VectorModelTraining training;
+  if (options.descriptor == ImageVectorOptions::Descriptor::kAsmk) {
+    const VocabularyOptions words;
+    const RowMatrixXf samples = DrawSamples(words.num_training_descriptors, seed, database, images,
+                                            threads, stop, RootSift);
+    training.model.vocabulary = LearnVocabulary(words, seed, samples, threads, &stop);
+    return training;
+  }
+  if (!HasMixture(options.descriptor)) return training;
+  RowMatrixXf samples = DrawSamples(options.num_training_descriptors, seed, database, images,
+                                    threads, stop, DescriptorsToFloat);
   if (options.pca_dim > 0) {
     training.model.pca = LearnPca(samples, options.pca_dim, threads);
     samples = training.model.pca.Project(samples);
@@ -117,6 +141,7 @@ std::size_t VectorDim(const ImageVectorOptions& options, const VectorModel& mode
     case ImageVectorOptions::Descriptor::kGist:
       return kGistDim;
     case ImageVectorOptions::Descriptor::kFile:
+    case ImageVectorOptions::Descriptor::kAsmk:
       break;
   }
   return 0;
@@ -158,6 +183,22 @@ std::vector<float> EncodeImages(const ImageVectorOptions& options, const VectorM
     encode_with(FisherVectorEncoder(model.mixture));
   }
   return vectors;
+}
+
+std::vector<VisualWords> EncodeImagesAsWords(const VectorModel& model, Database& database,
+                                             const std::vector<ImageRecord>& images,
+                                             ThreadPool& threads, const StopRequest& stop) {
+  const VisualWordEncoder encoder(model.vocabulary);
+  std::vector<VisualWords> words(images.size());
+  ForEachImage(
+      images, threads, stop,
+      [&](const ImageRecord& image) {
+        return SelectedDescriptors(database.ReadDescriptors(image));
+      },
+      [&](std::size_t i, const SelectedDescriptors& selected) {
+        words[i] = encoder.Encode(RootSift(selected.data.data(), selected.num));
+      });
+  return words;
 }
 
 }  // namespace colmap_graphmatch

@@ -6,6 +6,7 @@
 
 #include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/thread_pool.h"
+#include "colmap_graphmatch/base/visual_words.h"
 #include "colmap_graphmatch/database/database.h"
 #include "colmap_graphmatch/vectors/options.h"
 #include "colmap_graphmatch/vectors/vector_model.h"
@@ -27,7 +28,7 @@ VectorModelTraining LearnVectorModel(const ImageVectorOptions& options, std::uin
                                      Database& database, const std::vector<ImageRecord>& images,
                                      ThreadPool& threads, const StopRequest& stop);
 
-// The length of the vectors.
+// The length of the vectors; 0 for kAsmk, which has none, and kFile.
 std::size_t VectorDim(const ImageVectorOptions& options, const VectorModel& model);
 
 // The vectors of the images, all of which must have features: a row of VectorDim floats each. Reads
@@ -36,5 +37,10 @@ std::size_t VectorDim(const ImageVectorOptions& options, const VectorModel& mode
 std::vector<float> EncodeImages(const ImageVectorOptions& options, const VectorModel& model,
                                 Database& database, const std::vector<ImageRecord>& images,
                                 ThreadPool& threads, const StopRequest& stop);
+
+// The same for kAsmk: the visual words of all features of each image.
+std::vector<VisualWords> EncodeImagesAsWords(const VectorModel& model, Database& database,
+                                             const std::vector<ImageRecord>& images,
+                                             ThreadPool& threads, const StopRequest& stop);
 
 }  // namespace colmap_graphmatch

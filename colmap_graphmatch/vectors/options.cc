@@ -2,6 +2,7 @@
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/encoding/vocabulary.h"
 
 namespace colmap_graphmatch {
 
@@ -13,10 +14,16 @@ const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor) {
       return "VLAD";
     case ImageVectorOptions::Descriptor::kGist:
       return "GIST";
+    case ImageVectorOptions::Descriptor::kAsmk:
+      return "visual words";
     case ImageVectorOptions::Descriptor::kFile:
       break;
   }
   return "vectors";
+}
+
+const char* NameOfModel(ImageVectorOptions::Descriptor descriptor) {
+  return descriptor == ImageVectorOptions::Descriptor::kAsmk ? "vocabulary" : "mixture";
 }
 
 void ImageVectorOptions::Check() const {
@@ -46,6 +53,7 @@ void ImageVectorOptions::Check() const {
 std::string ImageVectorOptions::Key(std::uint64_t seed) const {
   // Does not compile if a field is forgotten.
   const auto& [described_by, photos, vectors, dim, mixture, num_training, num_features] = *this;
+  if (described_by == Descriptor::kAsmk) return "visual words, " + VocabularyOptions().Key(seed);
   // The seed is there twice, as in the state files that there are.
   return "descriptor " + std::to_string(static_cast<int>(described_by)) + ", PCA " +
          std::to_string(dim) + ", " + mixture.Key(seed) + ", training " +
@@ -64,6 +72,11 @@ void ImageRankingOptions::Check() const {
     throw OptionsError(
         "--GraphMatching.ranking_path and --GraphMatching.descriptor contradict each other: give "
         "one of them.");
+  }
+  if (!export_path.empty() && vectors.descriptor == ImageVectorOptions::Descriptor::kAsmk) {
+    throw OptionsError(
+        "--GraphMatching.export_vectors writes a row of numbers for each image, and "
+        "--GraphMatching.descriptor asmk describes images by visual words: leave one of them out.");
   }
   if (!export_path.empty() && (given || !ranking_path.empty())) {
     throw OptionsError(

@@ -10,9 +10,10 @@
 namespace colmap_graphmatch {
 
 struct ImageVectorOptions {
-  // kFisher: Fisher vectors of SIFT features. For comparison kVlad: VLAD under the same mixture,
-  // kGist: GIST of the photos, kFile: vectors that another program made.
-  enum class Descriptor { kFisher, kVlad, kGist, kFile };
+  // kFisher: Fisher vectors of SIFT features. kAsmk: visual words of all features, compared by an
+  // aggregated selective match kernel. For comparison kVlad: VLAD under the same mixture, kGist:
+  // GIST of the photos, kFile: vectors that another program made. (State files have the numbers.)
+  enum class Descriptor { kFisher, kVlad, kGist, kFile, kAsmk };
   Descriptor descriptor = Descriptor::kFisher;
 
   // Where the photos are, for kGist.
@@ -36,24 +37,28 @@ struct ImageVectorOptions {
   // Descriptors an image that are encoded at most: those of the largest scales. Paper: 1,000.
   int max_num_features = 1000;
 
-  // Names the seed and the values of all fields but the paths: their contents count, not where they
-  // are. The state files of users keep mixture and vectors under it, and under another key all are
-  // made anew. So a new field is written only where it differs from its default: what earlier
-  // versions wrote stays valid.
+  // Names the seed and the values of all fields that have a say, but the paths: their contents
+  // count, not where they are. The state files of users keep mixture and vectors under it, and
+  // under another key all are made anew. So a new field is written only where it differs from its
+  // default: what earlier versions wrote stays valid.
   std::string Key(std::uint64_t seed) const;
 
   // Throws OptionsError.
   void Check() const;
 };
 
-inline constexpr EnumWords<ImageVectorOptions::Descriptor, 4> kDescriptorWords = {
+inline constexpr EnumWords<ImageVectorOptions::Descriptor, 5> kDescriptorWords = {
     {{ImageVectorOptions::Descriptor::kFisher, "fisher"},
+     {ImageVectorOptions::Descriptor::kAsmk, "asmk"},
      {ImageVectorOptions::Descriptor::kVlad, "vlad"},
      {ImageVectorOptions::Descriptor::kGist, "gist"},
      {ImageVectorOptions::Descriptor::kFile, "file"}}};
 
 // For messages, e.g. "Fisher vectors".
 const char* NameOfVectors(ImageVectorOptions::Descriptor descriptor);
+
+// What they are made with, for messages: "mixture" or "vocabulary".
+const char* NameOfModel(ImageVectorOptions::Descriptor descriptor);
 
 struct ImageRankingOptions {
   ImageVectorOptions vectors;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/vectors/asmk_blobs.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -34,6 +35,7 @@ std::size_t SizeInBytes(const VectorModel& model) {
 }  // namespace
 
 sqlite::Blob Serialize(const VectorModel& model) {
+  if (model.vocabulary.words.rows() > 0) return Serialize(model.vocabulary);
   const Header header = {model.mixture.NumComponents(), model.mixture.Dim(), model.pca.mean.size()};
   sqlite::Blob blob(SizeInBytes(model));
   std::uint8_t* target = blob.data();
@@ -49,6 +51,11 @@ sqlite::Blob Serialize(const VectorModel& model) {
 }
 
 std::optional<VectorModel> Deserialize(const sqlite::Blob& blob, const VectorModelShape& shape) {
+  if (shape.is_vocabulary) {
+    std::optional<Vocabulary> vocabulary = DeserializeVocabulary(blob, VocabularyOptions());
+    if (!vocabulary) return std::nullopt;
+    return VectorModel{{}, {}, std::move(*vocabulary)};
+  }
   Header header = {};
   if (blob.size() < sizeof(header)) return std::nullopt;
   std::memcpy(header.data(), blob.data(), sizeof(header));
