@@ -24,6 +24,7 @@
 #include "tests/support/explore.h"
 #include "tests/support/recording_verifier.h"
 #include "tests/support/reference_graphmatch.h"
+#include "tests/support/walk_scene.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -34,67 +35,6 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::Pair;
 using ::testing::SizeIs;
-
-constexpr std::size_t kDim = 16;
-
-// Places with photos taken on walks: photos of a place look like it (noise apart), and those near
-// each other on the walk match.
-struct Scene {
-  std::vector<float> vectors;
-  std::set<VertexPair> edges;
-  std::size_t num_vertices = 0;
-};
-
-Scene MakeScene(int num_places, int photos_a_place, int reach, double noise, std::uint64_t seed) {
-  Random random({seed});
-  const auto gauss = [&random] {
-    double sum = -6;
-    for (int i = 0; i < 12; ++i) sum += random.Uniform();
-    return sum;
-  };
-  Scene scene;
-  for (int place = 0; place < num_places; ++place) {
-    std::vector<double> center(kDim);
-    for (double& value : center) value = gauss();
-    const auto first = static_cast<Vertex>(scene.num_vertices);
-    for (int photo = 0; photo < photos_a_place; ++photo) {
-      std::vector<double> vector(kDim);
-      double norm = 0;
-      for (std::size_t d = 0; d < kDim; ++d) {
-        vector[d] = center[d] + noise * gauss();
-        norm += vector[d] * vector[d];
-      }
-      for (const double value : vector) {
-        scene.vectors.push_back(static_cast<float>(value / std::sqrt(norm)));
-      }
-      for (int other = std::max(0, photo - reach); other < photo; ++other) {
-        scene.edges.emplace(first + static_cast<Vertex>(other), first + static_cast<Vertex>(photo));
-      }
-      ++scene.num_vertices;
-    }
-  }
-  return scene;
-}
-
-VectorRanking MakeRanking(const Scene& scene, std::size_t list_length = 512) {
-  ThreadPool threads(2);
-  RankingOptions options;
-  options.list_length = list_length;
-  return VectorRanking(options, scene.num_vertices, kDim, scene.vectors, threads);
-}
-
-// Not 0, 1, 2, ...: the loop must not take vertices for ids.
-std::vector<ImageId> MakeIds(std::size_t num_vertices) {
-  std::vector<ImageId> ids;
-  for (std::size_t i = 0; i < num_vertices; ++i) ids.push_back(static_cast<ImageId>(7 + 3 * i));
-  return ids;
-}
-
-std::set<ImagePair> ImageEdges(const Scene& scene, const std::vector<ImageId>& ids) {
-  std::set<ImagePair> edges;
-  for (const auto& [a, b] : scene.edges) edges.emplace(ids[a], ids[b]);
-  return edges;
-}
 
 ExplorationResult RunLoop(const GraphMatchOptions& options, const Ranking& ranking,
                           RecordingVerifier* verifier, int num_threads = 2) {
@@ -763,7 +703,7 @@ TEST(Loop, InterruptedAfterOtherMatchersItEndsAsIfItHadNotBeen) {
       RecordingVerifier verifier(edges);
       verifier.known = known;
       verifier.stop_after = num;
-      seeds = ChooseSeeds(options, ranking, ids, verifier, threads, seeds);
+      seeds = ChooseGraphMatchSeeds(options, ranking, ids, verifier, threads, seeds);
       EXPECT_THAT(seeds, ElementsAreArray(others));
       RunGraphMatch(options, ranking, ids, verifier, threads, nullptr, seeds);
       known.insert(verifier.tested.begin(), verifier.tested.end());

@@ -165,9 +165,9 @@ void Table::AddGraph() {
   PipelineOptions& p = line_->pipeline;
   Section("GraphMatch: which pairs are tested");
   Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategyWords),
-      "which pairs are tested: those that graphmatch finds; for comparison sampling or propagation "
-      "(after one sampling) alone, retrieval: the nearest images of each, briad: retrieval and "
-      "query expansion; exhaustive: all")
+      "which pairs are tested: those that graphmatch finds, or best_first: the likeliest; for "
+      "comparison sampling or propagation (after one sampling) alone, retrieval: the nearest "
+      "images of each, briad: retrieval and query expansion; exhaustive: all")
       .is_common = true;
   Add("GraphMatching.match_list_path", TextOf(&p.match_list_path, "the path of a list of pairs"),
       "a file of image pairs to be tested instead, two names a line")
@@ -192,6 +192,10 @@ void Table::AddGraph() {
   AddName("VocabTreeMatching.num_images", &neighbors);
   Add("GraphMatching.num_to_propagate", IntOf(&p.graph.num_to_propagate, 0),
       "images (>= 0) that each neighbour hands on to an image in an iteration");
+  Add("GraphMatching.min_edge_probability",
+      DoubleOf(&p.best_first.min_edge_probability, Zero::kNotAllowed),
+      "best_first ends when it thinks no pair as probable (> 0, < 1) to be an edge. Lower finds weaker "
+      "links and costs more tests");
   Add("GraphMatching.max_pairs", CountOf(&p.budget.max_pairs),
       "pairs (>= 0) that the run may test, the most promising of each batch first; a later run "
       "goes on; 0: no limit");

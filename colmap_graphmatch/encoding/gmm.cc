@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/exact_text.h"
 #include "colmap_graphmatch/base/random.h"
 #include "colmap_graphmatch/encoding/matrix_product.h"
 
@@ -27,12 +28,6 @@ constexpr double kEmptyComponent = 1e-3;
 constexpr int kMaxReplacedComponents = 16;
 
 constexpr double kLog2Pi = 1.8378770664093454836;
-
-std::string Hex(double value) {
-  std::array<char, 32> text = {};
-  std::snprintf(text.data(), text.size(), "%a", value);
-  return text.data();
-}
 
 Eigen::Index PaddedColumns(Eigen::Index num) {
   const auto padding = static_cast<Eigen::Index>(kColumnPadding);
@@ -209,8 +204,8 @@ void GmmOptions::Check() const {
 std::string GmmOptions::Key(std::uint64_t seed) const {
   // Does not compile if a field is forgotten.
   const auto& [components, least_growth, iterations, floor] = *this;
-  return "components " + std::to_string(components) + ", tolerance " + Hex(least_growth) +
-         ", iterations " + std::to_string(iterations) + ", variance floor " + Hex(floor) +
+  return "components " + std::to_string(components) + ", tolerance " + ExactText(least_growth) +
+         ", iterations " + std::to_string(iterations) + ", variance floor " + ExactText(floor) +
          ", seed " + std::to_string(seed);
 }
 

@@ -1,11 +1,8 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
-#include "colmap_graphmatch/base/pair_verifier.h"
 #include "colmap_graphmatch/base/thread_pool.h"
-#include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
 #include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/graph/pair_proposer.h"
@@ -41,17 +38,5 @@ class GraphMatchProposer : public PairProposer {
   int iteration_ = -1;        // Of the last proposal.
   bool has_sampled_ = false;  // The last proposal was samples.
 };
-
-// Finds out which known pairs have to be part of the graph from the start, so that what earlier
-// runs did is gone on with (docs/design.md); ascending. Known pairs that are no seeds are answered
-// from what is known in the places where an undisturbed run would have tested them; so a run that
-// goes on after an interruption follows the path of the first and tests what is missing. If the
-// loop, started from the earlier seeds (those of the run that may have been interrupted; ascending)
-// or from none, asks for everything that is known, these are the seeds. Otherwise another matcher
-// tested pairs, or images were added, and all known pairs are.
-std::vector<ImagePair> ChooseSeeds(const GraphMatchOptions& options, const Ranking& ranking,
-                                   const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-                                   ThreadPool& threads,
-                                   const std::vector<ImagePair>& earlier_seeds);
 
 }  // namespace colmap_graphmatch

@@ -40,6 +40,9 @@ class MatchingGraph {
   bool IsTested(Vertex a, Vertex b) const;
   std::size_t NumTestedOf(Vertex vertex) const { return tested_[vertex].size(); }
 
+  // The vertices that it was tested with, ascending.
+  const std::vector<Vertex>& Tested(Vertex vertex) const { return tested_[vertex]; }
+
   // In the order in which they were added.
   const std::vector<VertexPair>& Edges() const { return edges_; }
 

@@ -14,6 +14,8 @@ const char* StageName(LoopStage stage) {
       return "expansion";
     case LoopStage::kListed:
       return "listed";
+    case LoopStage::kLikeliest:
+      return "likeliest";
   }
   return "unknown";
 }

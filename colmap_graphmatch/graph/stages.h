@@ -6,21 +6,22 @@
 namespace colmap_graphmatch {
 
 // Who proposed a pair. kSampling, kPropagation: the paper's loop. kListed: the pairs were given
-// beforehand, or are all. kRetrieval: the ranking, kExpansion: query expansion after it. kLast is
-// another name of the last one.
+// beforehand, or are all. kRetrieval: the ranking, kExpansion: query expansion after it.
+// kLikeliest: a model of what was tested before. kLast is another name of the last one.
 enum class LoopStage {
   kSampling,
   kPropagation,
   kListed,
   kRetrieval,
   kExpansion,
-  kLast = kExpansion
+  kLikeliest,
+  kLast = kLikeliest
 };
 
 // All of them, in the order of the enumeration.
-inline constexpr std::array<LoopStage, 5> kLoopStages = {
-    LoopStage::kSampling, LoopStage::kPropagation, LoopStage::kListed, LoopStage::kRetrieval,
-    LoopStage::kExpansion};
+inline constexpr std::array<LoopStage, 6> kLoopStages = {
+    LoopStage::kSampling,  LoopStage::kPropagation, LoopStage::kListed,
+    LoopStage::kRetrieval, LoopStage::kExpansion,   LoopStage::kLikeliest};
 static_assert(kLoopStages.size() == static_cast<std::size_t>(LoopStage::kLast) + 1 &&
                   kLoopStages.back() == LoopStage::kLast,
               "kLoopStages must have every LoopStage.");

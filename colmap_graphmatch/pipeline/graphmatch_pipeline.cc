@@ -10,7 +10,7 @@
 #include "colmap_graphmatch/colmap_graphmatch.h"
 #include "colmap_graphmatch/files/pair_log.h"
 #include "colmap_graphmatch/graph/explorer.h"
-#include "colmap_graphmatch/graph/graphmatch.h"
+#include "colmap_graphmatch/graph/seeds.h"
 #include "colmap_graphmatch/pipeline/budgeted_verifier.h"
 #include "colmap_graphmatch/pipeline/details_recorder.h"
 #include "colmap_graphmatch/pipeline/run_setup.h"
@@ -83,6 +83,7 @@ class Pipeline {
   void Explore();
   PipelineResult Conclude();
 
+  std::unique_ptr<PairProposer> NewProposer();
   // Which of the known pairs join the graph; what the loop starts from is kept for later runs.
   KnownPairsPolicy ChooseKnown();
   BudgetedVerifier::Order OrderOfTests() const;
@@ -119,9 +120,7 @@ void Pipeline::Explore() {
       verification_->Verifier(), options_.budget, setup_.threads.NumThreads(),
       [this] { return Seconds(); }, OrderOfTests());
   result_.matching = Timed(&result_.matching_seconds, [&] {
-    const std::unique_ptr<PairProposer> proposer = MakeProposer(
-        options_,
-        {ids_, restrictions_, setup_.listed_pairs, ranked_.ranking.get(), setup_.threads});
+    const std::unique_ptr<PairProposer> proposer = NewProposer();
     return colmap_graphmatch::Explore(
         *proposer, ids_, budgeted, [this](const LoopProgress& progress) { OnProgress(progress); },
         ChooseKnown());
@@ -145,16 +144,19 @@ PipelineResult Pipeline::Conclude() {
   return std::move(result_);
 }
 
+std::unique_ptr<PairProposer> Pipeline::NewProposer() {
+  return MakeProposer(
+      options_, {ids_, restrictions_, setup_.listed_pairs, ranked_.ranking.get(), setup_.threads});
+}
+
 KnownPairsPolicy Pipeline::ChooseKnown() {
   KnownPairsPolicy known;
   // A replay knows no pair beforehand, and its checkpoint keeps nothing.
   if (setup_.kind == RunKind::kReplay) return known;
-  if (!options_.RanksImages() || !IsLoop(options_.strategy)) return known;
-  GraphMatchOptions graph = LoopOptionsOf(options_);
-  graph.restrictions = restrictions_;
+  if (!options_.RanksImages() || !StartsFromSeeds(options_.strategy)) return known;
   const std::string key = LoopKey(options_, restrictions_);
-  known.seeds = ChooseSeeds(graph, *ranked_.ranking, ids_, verification_->Verifier(),
-                            setup_.threads, setup_.checkpoint.ReadSeeds(key));
+  known.seeds = ChooseSeeds([this] { return NewProposer(); }, ids_, verification_->Verifier(),
+                            setup_.checkpoint.ReadSeeds(key));
   setup_.checkpoint.KeepSeeds(key, known.seeds);
   return known;
 }

@@ -18,6 +18,7 @@ bool PipelineOptions::RanksImages() const {
     case Strategy::kPropagation:
     case Strategy::kRetrieval:
     case Strategy::kBriad:
+    case Strategy::kBestFirst:
       return true;
     case Strategy::kExhaustive:
       break;
@@ -52,6 +53,7 @@ void PipelineOptions::Check() const {
   budget.Check();
   ranking.Check();
   graph.Check();
+  best_first.Check();
   verification.Check();
 }
 

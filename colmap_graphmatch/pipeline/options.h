@@ -6,6 +6,7 @@
 #include <string>
 
 #include "colmap_graphmatch/base/enum_words.h"
+#include "colmap_graphmatch/graph/best_first.h"
 #include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/vectors/options.h"
 #include "colmap_graphmatch/verification/options.h"
@@ -28,10 +29,19 @@ struct PipelineOptions {
 
   // Which pairs are tested. kGraphMatch: those that the loop finds. kSampling: the loop without
   // propagation. kPropagation: the loop with its first sampling alone. kRetrieval: the nearest
-  // images of each. kBriad: the same and then num_expansions rounds of query expansion.
+  // images of each. kBriad: the same and then num_expansions rounds of query expansion. kBestFirst:
+  // the likeliest ones first, as the tests before them say.
   // kExhaustive: all.
   // (pipeline/strategy.h says what makes a new one.)
-  enum class Strategy { kGraphMatch, kSampling, kPropagation, kRetrieval, kBriad, kExhaustive };
+  enum class Strategy {
+    kGraphMatch,
+    kSampling,
+    kPropagation,
+    kRetrieval,
+    kBriad,
+    kBestFirst,
+    kExhaustive
+  };
   Strategy strategy = Strategy::kGraphMatch;
 
   // Tests the pairs of this list (docs/formats.md) instead, unless it is empty.
@@ -63,6 +73,9 @@ struct PipelineOptions {
   // skip_image_pairs_in_same_frame.
   GraphMatchOptions graph;
 
+  // best_first.restrictions: as graph.restrictions.
+  BestFirstOptions best_first;
+
   // Images that kRetrieval and kBriad retrieve for each; 0: 120, for kBriad 40, as in the paper.
   int num_retrieved_images = 0;
   int num_expansions = 4;
@@ -90,12 +103,13 @@ struct PipelineOptions {
   void Check() const;
 };
 
-inline constexpr EnumWords<PipelineOptions::Strategy, 6> kStrategyWords = {
+inline constexpr EnumWords<PipelineOptions::Strategy, 7> kStrategyWords = {
     {{PipelineOptions::Strategy::kGraphMatch, "graphmatch"},
      {PipelineOptions::Strategy::kSampling, "sampling"},
      {PipelineOptions::Strategy::kPropagation, "propagation"},
      {PipelineOptions::Strategy::kRetrieval, "retrieval"},
      {PipelineOptions::Strategy::kBriad, "briad"},
+     {PipelineOptions::Strategy::kBestFirst, "best_first"},
      {PipelineOptions::Strategy::kExhaustive, "exhaustive"}}};
 
 }  // namespace colmap_graphmatch

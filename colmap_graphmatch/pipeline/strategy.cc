@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "colmap_graphmatch/graph/best_first.h"
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/listed_pairs.h"
 
@@ -10,11 +11,12 @@ namespace colmap_graphmatch {
 
 using Strategy = PipelineOptions::Strategy;
 
-bool IsLoop(Strategy strategy) {
+bool StartsFromSeeds(Strategy strategy) {
   switch (strategy) {
     case Strategy::kGraphMatch:
     case Strategy::kSampling:
     case Strategy::kPropagation:
+    case Strategy::kBestFirst:
       return true;
     case Strategy::kRetrieval:
     case Strategy::kBriad:
@@ -36,6 +38,7 @@ GraphMatchOptions LoopOptionsOf(const PipelineOptions& options) {
     case Strategy::kGraphMatch:
     case Strategy::kRetrieval:
     case Strategy::kBriad:
+    case Strategy::kBestFirst:
     case Strategy::kExhaustive:
       break;
   }
@@ -53,6 +56,7 @@ RetrievalOptions RetrievalOptionsOf(const PipelineOptions& options) {
     case Strategy::kSampling:
     case Strategy::kPropagation:
     case Strategy::kRetrieval:
+    case Strategy::kBestFirst:
     case Strategy::kExhaustive:
       break;
   }
@@ -69,6 +73,8 @@ int DrawsPerImage(const PipelineOptions& options, std::size_t num_images) {
     case Strategy::kRetrieval:
     case Strategy::kBriad:
       return RetrievalOptionsOf(options).num_images;
+    case Strategy::kBestFirst:
+      return static_cast<int>(BestFirstProposer::NumNearest());
     case Strategy::kExhaustive:
       break;
   }
@@ -76,10 +82,16 @@ int DrawsPerImage(const PipelineOptions& options, std::size_t num_images) {
 }
 
 std::string LoopKey(const PipelineOptions& options, const PairRestrictions& restrictions) {
+  const std::string inliers =
+      ", inliers " + std::to_string(options.verification.geometry.min_num_inliers);
+  if (options.strategy == Strategy::kBestFirst) {
+    BestFirstOptions best_first = options.best_first;
+    best_first.restrictions = restrictions;
+    return "best first: " + best_first.Key() + inliers;
+  }
   GraphMatchOptions graph = LoopOptionsOf(options);
   graph.restrictions = restrictions;
-  return "loop: " + graph.Key() + ", inliers " +
-         std::to_string(options.verification.geometry.min_num_inliers);
+  return "loop: " + graph.Key() + inliers;
 }
 
 std::unique_ptr<PairProposer> MakeProposer(const PipelineOptions& options,
@@ -101,6 +113,11 @@ std::unique_ptr<PairProposer> MakeProposer(const PipelineOptions& options,
       RetrievalOptions retrieval = RetrievalOptionsOf(options);
       retrieval.restrictions = input.restrictions;
       return std::make_unique<RetrievalProposer>(retrieval, *input.ranking, input.threads);
+    }
+    case Strategy::kBestFirst: {
+      BestFirstOptions best_first = options.best_first;
+      best_first.restrictions = input.restrictions;
+      return std::make_unique<BestFirstProposer>(best_first, *input.ranking, input.threads);
     }
     case Strategy::kExhaustive:
       return std::make_unique<AllPairsProposer>(input.restrictions);

@@ -20,8 +20,8 @@ namespace colmap_graphmatch {
 // a value of PipelineOptions::Strategy with its word (pipeline/options.h), and a case in the
 // switches over it: those of strategy.cc, and PipelineOptions::RanksImages.
 
-// Whether the strategy samples and propagates: then it starts from seeds.
-bool IsLoop(PipelineOptions::Strategy strategy);
+// Whether what it proposes depends on what it found: then it starts from seeds.
+bool StartsFromSeeds(PipelineOptions::Strategy strategy);
 
 // The loop that the options come to; with a strategy that is no loop, of the paper.
 GraphMatchOptions LoopOptionsOf(const PipelineOptions& options);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -7,10 +8,20 @@
 #include "colmap_graphmatch/graph/graphmatch.h"
 #include "colmap_graphmatch/graph/listed_pairs.h"
 #include "colmap_graphmatch/graph/retrieval.h"
+#include "colmap_graphmatch/graph/seeds.h"
 
 namespace colmap_graphmatch {
 
 // Explore with each of the proposers.
+
+inline std::vector<ImagePair> ChooseGraphMatchSeeds(const GraphMatchOptions& options,
+                                                    const Ranking& ranking,
+                                                    const std::vector<ImageId>& ids,
+                                                    PairVerifier& verifier, ThreadPool& threads,
+                                                    const std::vector<ImagePair>& earlier) {
+  const auto make = [&] { return std::make_unique<GraphMatchProposer>(options, ranking, threads); };
+  return ChooseSeeds(make, ids, verifier, earlier);
+}
 
 inline ExplorationResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,
                                        const std::vector<ImageId>& ids, PairVerifier& verifier,
@@ -24,7 +35,7 @@ inline ExplorationResult RunGraphMatch(const GraphMatchOptions& options, const R
                                        const std::vector<ImageId>& ids, PairVerifier& verifier,
                                        ThreadPool& threads, const OnProgress& on_progress) {
   return RunGraphMatch(options, ranking, ids, verifier, threads, on_progress,
-                       ChooseSeeds(options, ranking, ids, verifier, threads, {}));
+                       ChooseGraphMatchSeeds(options, ranking, ids, verifier, threads, {}));
 }
 
 inline ExplorationResult RunRetrieval(const RetrievalOptions& options, const Ranking& ranking,

@@ -15,7 +15,7 @@ const components = report.connected_components;
 const minInliers = report.min_num_inliers;
 // In the order of a run; then those that this page does not know yet.
 const stageNames = [...new Set(['sampling', 'propagation', 'listed', 'retrieval', 'expansion',
-  ...Object.keys(report.stages)])];
+  'likeliest', ...Object.keys(report.stages)])];
 
 // The edges by inliers, most first.
 const edges = report.edge_list.slice().sort((a, b) => b[2] - a[2]);

@@ -1,0 +1,377 @@
+#include "colmap_graphmatch/graph/best_first.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/random.h"
+#include "colmap_graphmatch/graph/explorer.h"
+#include "colmap_graphmatch/graph/seeds.h"
+#include "colmap_graphmatch/ranking/list_ranking.h"
+#include "tests/support/explore.h"
+#include "tests/support/recording_verifier.h"
+#include "tests/support/walk_scene.h"
+
+namespace colmap_graphmatch {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+ExplorationResult RunBestFirst(const BestFirstOptions& options, const Ranking& ranking,
+                               RecordingVerifier* verifier, int num_threads = 2) {
+  ThreadPool threads(num_threads);
+  const std::vector<ImageId> ids = MakeIds(ranking.NumVertices());
+  const auto make = [&] { return std::make_unique<BestFirstProposer>(options, ranking, threads); };
+  const std::unique_ptr<PairProposer> proposer = make();
+  return Explore(*proposer, ids, *verifier, nullptr, {ChooseSeeds(make, ids, *verifier, {})});
+}
+
+// A graph of random tests with random inliers, and the same as plain sets.
+struct RandomGraph {
+  MatchingGraph graph{0};
+  SharedTracks tracks{0};
+  std::vector<TestedVertexPair> tested;  // Ascending.
+  std::map<VertexPair, FeatureMatches> inliers;
+};
+
+RandomGraph MakeRandomGraph(std::size_t num_vertices, double share_tested, std::uint64_t seed,
+                            const std::set<VertexPair>& left_out = {}) {
+  Random random({seed});
+  RandomGraph made;
+  made.graph = MatchingGraph(num_vertices);
+  made.tracks = SharedTracks(num_vertices);
+  for (Vertex a = 0; a < num_vertices; ++a) {
+    for (Vertex b = a + 1; b < num_vertices; ++b) {
+      if (random.Uniform() >= share_tested) continue;
+      const bool is_edge = random.Uniform() < 0.6;
+      FeatureMatches matches;
+      // Beyond 64 bits, and some edges without inliers.
+      const std::uint64_t num_matches = is_edge ? random.Index(40) : 0;
+      for (std::uint64_t i = 0; i < num_matches; ++i) {
+        matches.push_back({static_cast<std::uint32_t>(random.Index(150)),
+                           static_cast<std::uint32_t>(random.Index(150))});
+      }
+      if (left_out.count({a, b}) > 0) continue;
+      made.tested.push_back({{a, b}, is_edge});
+      if (!is_edge) continue;
+      made.tracks.Add({a, b}, matches);
+      made.inliers[{a, b}] = matches;
+    }
+  }
+  made.graph.Add(made.tested);
+  return made;
+}
+
+// The features of a vertex that are inliers with a neighbour.
+std::set<std::uint32_t> FeaturesOf(const RandomGraph& graph, Vertex vertex, Vertex neighbor) {
+  std::set<std::uint32_t> features;
+  for (const FeatureMatch& match : graph.inliers.at(MakeVertexPair(vertex, neighbor))) {
+    features.insert(vertex < neighbor ? match.feature1 : match.feature2);
+  }
+  return features;
+}
+
+// What PairEvidence says of its counts, from the definitions.
+struct Counts {
+  double num_common = 0;
+  double num_failed = 0;
+  double num_shared = 0;
+  double most_shared = 0;
+};
+
+Counts CountPlainly(const RandomGraph& random, Vertex a, Vertex c) {
+  std::map<VertexPair, bool> tests;
+  for (const TestedVertexPair& tested : random.tested) tests[tested.pair] = tested.is_edge;
+  const auto has = [&](Vertex x, Vertex y, bool is_edge) {
+    const auto found = tests.find(MakeVertexPair(x, y));
+    return x != y && found != tests.end() && found->second == is_edge;
+  };
+  Counts counts;
+  for (Vertex b = 0; b < random.graph.NumVertices(); ++b) {
+    if (b == a || b == c) continue;
+    if (has(a, b, true) && has(b, c, false)) ++counts.num_failed;
+    if (has(a, b, false) && has(b, c, true)) ++counts.num_failed;
+    if (!has(a, b, true) || !has(b, c, true)) continue;
+    ++counts.num_common;
+    double num_shared = 0;
+    const std::set<std::uint32_t> with_c = FeaturesOf(random, b, c);
+    for (const std::uint32_t feature : FeaturesOf(random, b, a)) {
+      num_shared += static_cast<double>(with_c.count(feature));
+    }
+    counts.num_shared += num_shared;
+    counts.most_shared = std::max(counts.most_shared, num_shared);
+  }
+  return counts;
+}
+
+TEST(SharedTracks, CountsFeaturesThatAreInliersOfBothEdges) {
+  SharedTracks tracks(4);
+  tracks.Add({0, 1}, {{0, 5}, {1, 70}, {2, 9}});
+  tracks.Add({1, 2}, {{70, 3}, {9, 4}, {8, 5}});
+  tracks.Add({1, 3}, {{8, 1}});
+  std::vector<std::pair<Vertex, std::size_t>> visited;
+  const auto visit = [&](Vertex c, std::size_t num) { visited.emplace_back(c, num); };
+  tracks.VisitThrough(0, 1, visit);
+  EXPECT_THAT(visited, ElementsAre(std::make_pair(Vertex{2}, std::size_t{2})));
+  visited.clear();
+  tracks.VisitThrough(3, 1, visit);
+  EXPECT_THAT(visited, ElementsAre(std::make_pair(Vertex{2}, std::size_t{1})));
+  visited.clear();
+  tracks.VisitThrough(0, 2, visit);  // Not an edge.
+  EXPECT_THAT(visited, IsEmpty());
+}
+
+TEST(SharedTracks, FeaturesThatNoImageHasTakeNoMemory) {
+  SharedTracks tracks(3);
+  tracks.Add({0, 1}, {{0xFFFFFFFF, 0xFFFFFFFF}});
+  tracks.Add({1, 2}, {{0xFFFFFFFF, 0xFFFFFFFF}});
+  tracks.VisitThrough(0, 1, [](Vertex, std::size_t) { FAIL(); });
+}
+
+TEST(PairEvidence, CollectsWhatTheDefinitionsSay) {
+  const Scene scene = MakeScene(4, 8, 3, 0.5, 1);
+  const VectorRanking ranking = MakeRanking(scene);
+  const PairRestrictions restrictions;
+  ThreadPool threads(2);
+  const PairEvidence evidence(ranking, restrictions, threads);
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const RandomGraph random = MakeRandomGraph(scene.num_vertices, 0.15, seed);
+    std::set<VertexPair> expected;
+    for (Vertex a = 0; a < scene.num_vertices; ++a) {
+      for (Vertex c = a + 1; c < scene.num_vertices; ++c) {
+        if (random.graph.IsTested(a, c)) continue;
+        if (CountPlainly(random, a, c).num_common > 0) expected.emplace(a, c);
+      }
+      int num_nearest = 0;
+      for (const Vertex c : ranking.NearestOf(a)) {
+        if (num_nearest == 3) break;
+        if (random.graph.IsTested(a, c)) continue;
+        expected.insert(MakeVertexPair(a, c));
+        ++num_nearest;
+      }
+    }
+    std::set<VertexPair> collected;
+    for (const Candidate& candidate : evidence.Collect(3, random.graph, random.tracks)) {
+      const auto [a, c] = candidate.pair;
+      EXPECT_TRUE(collected.emplace(a, c).second);
+      const Counts counts = CountPlainly(random, a, c);
+      EXPECT_EQ(candidate.cues[4], std::log1p(counts.most_shared));
+      EXPECT_EQ(candidate.cues[5], std::log1p(counts.num_shared));
+      EXPECT_EQ(candidate.cues[6], std::log1p(counts.num_common));
+      const double least_degree =
+          static_cast<double>(std::min(random.graph.Degree(a), random.graph.Degree(c)));
+      EXPECT_EQ(candidate.cues[7], counts.num_common / (least_degree + 1));
+      EXPECT_EQ(candidate.cues[8],
+                counts.num_failed / (counts.num_failed + 2 * counts.num_common + 1));
+    }
+    EXPECT_EQ(collected, expected);
+  }
+}
+
+TEST(PairEvidence, OfATestedPairDoesNotKnowOfTheTest) {
+  const Scene scene = MakeScene(3, 7, 3, 0.5, 2);
+  const VectorRanking ranking = MakeRanking(scene);
+  const PairRestrictions restrictions;
+  ThreadPool threads(2);
+  const PairEvidence evidence(ranking, restrictions, threads);
+  const RandomGraph whole = MakeRandomGraph(scene.num_vertices, 0.3, 7);
+  const std::vector<LabelledCues> described =
+      evidence.Describe(whole.tested, whole.graph, whole.tracks);
+  ASSERT_EQ(described.size(), whole.tested.size());
+  int num_compared = 0;
+  for (std::size_t i = 0; i < whole.tested.size(); ++i) {
+    EXPECT_EQ(described[i].is_edge, whole.tested[i].is_edge);
+    const RandomGraph without = MakeRandomGraph(scene.num_vertices, 0.3, 7, {whole.tested[i].pair});
+    for (const Candidate& candidate :
+         evidence.Collect(scene.num_vertices, without.graph, without.tracks)) {
+      if (candidate.pair != whole.tested[i].pair) continue;
+      EXPECT_EQ(candidate.cues, described[i].cues);
+      ++num_compared;
+    }
+  }
+  EXPECT_EQ(num_compared, static_cast<int>(whole.tested.size()));
+}
+
+TEST(EdgeModel, FindsTheCoefficientsThatMadeTheTests) {
+  Random random({5});
+  std::vector<LabelledCues> tested;
+  for (int i = 0; i < 20000; ++i) {
+    LabelledCues one;
+    one.cues = {1, random.Uniform() * 4 - 2, random.Uniform() * 4 - 2};
+    const double x = -0.5 + 2 * one.cues[1] - 1 * one.cues[2];
+    one.is_edge = random.Uniform() < 1 / (1 + std::exp(-x));
+    tested.push_back(one);
+  }
+  EdgeModel model;
+  model.Fit(tested);
+  EXPECT_NEAR(model.Coefficients()[0], -0.5, 0.1);
+  EXPECT_NEAR(model.Coefficients()[1], 2, 0.1);
+  EXPECT_NEAR(model.Coefficients()[2], -1, 0.1);
+  EXPECT_NEAR(model.Coefficients()[3], 0, 1e-9);
+  EXPECT_NEAR(model.Probability({1, 0.5, 0.5}), 0.5, 0.02);
+}
+
+TEST(EdgeModel, WorksWhereAllTestsEndAlikeOrAreApart) {
+  const Cues near = {1, 1};
+  const Cues far = {1, -1};
+  for (const bool is_edge : {false, true}) {
+    EdgeModel model;
+    model.Fit(std::vector<LabelledCues>(50, {near, is_edge}));
+    EXPECT_EQ(model.Probability(near) > 0.9, is_edge);
+    EXPECT_EQ(model.Probability(near) < 0.1, !is_edge);
+  }
+  std::vector<LabelledCues> apart(50, {near, true});
+  apart.resize(100, {far, false});
+  EdgeModel model;
+  model.Fit(apart);
+  EXPECT_GT(model.Probability(near), 0.9);
+  EXPECT_LT(model.Probability(far), 0.1);
+  EdgeModel empty;
+  empty.Fit({});
+  EXPECT_EQ(empty.Probability(near), 0.5);
+}
+
+// Tests until this share of the edges is found.
+std::size_t TestsForRecall(double recall, const RecordingVerifier& verifier,
+                           const std::set<ImagePair>& edges) {
+  std::size_t num_edges = 0;
+  for (std::size_t i = 0; i < verifier.tested.size(); ++i) {
+    num_edges += edges.count(verifier.tested[i]);
+    if (static_cast<double>(num_edges) >= recall * static_cast<double>(edges.size())) return i + 1;
+  }
+  return verifier.tested.size() + 1;
+}
+
+TEST(BestFirst, FindsEdgesInFewerTestsThanTheLoop) {
+  const Scene scene = MakeScene(12, 20, 4, 0.6, 3);
+  const VectorRanking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  RecordingVerifier verifier(edges);
+  const ExplorationResult result = RunBestFirst({}, ranking, &verifier);
+  RecordingVerifier loop(edges);
+  ThreadPool threads(2);
+  RunGraphMatch({}, ranking, ids, loop, threads, nullptr);
+  for (const double recall : {0.5, 0.8, 0.9, 0.95}) {
+    EXPECT_LT(TestsForRecall(recall, verifier, edges), TestsForRecall(recall, loop, edges))
+        << recall;
+  }
+}
+
+TEST(BestFirst, TestsTheSameOnAnyNumberOfThreads) {
+  const Scene scene = MakeScene(8, 20, 5, 0.8, 4);
+  const VectorRanking ranking = MakeRanking(scene);
+  std::vector<std::vector<std::vector<ImagePair>>> batches;
+  for (const int num_threads : {1, 2, 3}) {
+    RecordingVerifier verifier(ImageEdges(scene, MakeIds(scene.num_vertices)));
+    RunBestFirst({}, ranking, &verifier, num_threads);
+    batches.push_back(verifier.batches);
+  }
+  EXPECT_GT(batches[0].size(), 3U);
+  EXPECT_EQ(batches[0], batches[1]);
+  EXPECT_EQ(batches[0], batches[2]);
+}
+
+TEST(BestFirst, GoesOnAfterAnInterruptionAsIfThereHadBeenNone) {
+  const Scene scene = MakeScene(8, 16, 4, 0.7, 5);
+  const VectorRanking ranking = MakeRanking(scene);
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  RecordingVerifier whole(edges);
+  RunBestFirst({}, ranking, &whole);
+  const std::set<ImagePair> expected(whole.tested.begin(), whole.tested.end());
+  for (std::size_t stop_after = 0; stop_after < whole.tested.size(); stop_after += 97) {
+    RecordingVerifier first(edges);
+    first.stop_after = stop_after;
+    RunBestFirst({}, ranking, &first);
+    RecordingVerifier second(edges);
+    second.known.insert(first.tested.begin(), first.tested.end());
+    RunBestFirst({}, ranking, &second);
+    std::set<ImagePair> tested = second.known;
+    tested.insert(second.tested.begin(), second.tested.end());
+    EXPECT_EQ(tested, expected) << "after " << stop_after;
+  }
+}
+
+TEST(BestFirst, LearnsFromWhatOthersHadTested) {
+  const Scene scene = MakeScene(8, 16, 4, 0.7, 6);
+  const VectorRanking ranking = MakeRanking(scene);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  const std::set<ImagePair> edges = ImageEdges(scene, ids);
+  RecordingVerifier verifier(edges);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    for (std::size_t j = i + 1; j < std::min(i + 9, ids.size()); ++j) {
+      if (i % 16 < 12) verifier.known.emplace(ids[i], ids[j]);
+    }
+  }
+  const ExplorationResult result = RunBestFirst({}, ranking, &verifier);
+  EXPECT_EQ(result.num_seed_pairs, verifier.known.size());
+  for (const ImagePair& pair : verifier.tested) EXPECT_EQ(verifier.known.count(pair), 0U);
+  EXPECT_GE(static_cast<double>(result.graph.NumEdges()),
+            0.98 * static_cast<double>(scene.edges.size()));
+  ASSERT_FALSE(verifier.batches.empty());
+  // It knows from the beginning what is likely.
+  EXPECT_EQ(result.stages[LoopStage::kSampling].num_tested, 0U);
+}
+
+TEST(BestFirst, TestsWhatMayBeTestedAlone) {
+  const Scene scene = MakeScene(4, 12, 3, 0.6, 7);
+  const VectorRanking ranking = MakeRanking(scene);
+  BestFirstOptions options;
+  options.restrictions.queries.resize(scene.num_vertices);
+  for (const Vertex vertex : {0, 5, 13, 40}) options.restrictions.queries[vertex] = true;
+  options.restrictions.frames.resize(scene.num_vertices);
+  options.restrictions.frames[0] = options.restrictions.frames[1] = 9;
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  RunBestFirst(options, ranking, &verifier);
+  EXPECT_FALSE(verifier.tested.empty());
+  const std::set<ImageId> queries = {ids[0], ids[5], ids[13], ids[40]};
+  for (const ImagePair& pair : verifier.tested) {
+    EXPECT_TRUE(queries.count(pair.id1) > 0 || queries.count(pair.id2) > 0);
+    EXPECT_FALSE(pair == ImagePair(ids[0], ids[1]));
+  }
+}
+
+TEST(BestFirst, EndsWhereThereIsNothingToFind) {
+  for (const std::size_t num_vertices : {0, 1, 2, 30}) {
+    std::vector<std::vector<ScoredVertex>> lists(num_vertices);
+    for (Vertex a = 0; a < num_vertices; ++a) {
+      for (Vertex b = 0; b < num_vertices; ++b) {
+        if (a != b) lists[a].push_back({b, 1.0F / static_cast<float>(1 + b)});
+      }
+    }
+    const ListRanking ranking(lists);
+    RecordingVerifier verifier({});
+    const ExplorationResult result = RunBestFirst({}, ranking, &verifier);
+    EXPECT_TRUE(result.finished);
+    EXPECT_EQ(verifier.tested.empty(), num_vertices < 2);
+  }
+  const ListRanking unranked(std::vector<std::vector<ScoredVertex>>(5));
+  RecordingVerifier verifier({});
+  EXPECT_TRUE(RunBestFirst({}, unranked, &verifier).finished);
+  EXPECT_THAT(verifier.tested, IsEmpty());
+}
+
+TEST(BestFirst, RefusesAProbabilityThatIsNone) {
+  for (const double probability : {0.0, -0.1, 1.0, std::nan("")}) {
+    BestFirstOptions options;
+    options.min_edge_probability = probability;
+    EXPECT_THROW(options.Check(), OptionsError) << probability;
+  }
+  BestFirstOptions options;
+  const std::string key = options.Key();
+  options.min_edge_probability = 0.006;
+  EXPECT_NE(options.Key(), key);
+}
+
+}  // namespace
+}  // namespace colmap_graphmatch
