@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
-from evaluation import (best_first, components, database, figures, page,  # noqa: E402
-                        reconstruction, scores, truth, vocabulary_tree)
+from evaluation import (components, database, figures, page, reconstruction,  # noqa: E402
+                        scores, truth, vocabulary_tree)
 from evaluation.errors import EvaluationError  # noqa: E402
 from scene_graph import generator, paper  # noqa: E402
 
@@ -233,17 +233,6 @@ class PageTest(DirectoryTest):
         self.assertEqual(text.count("data:image/png;base64,"), 2)
         self.assertNotIn('src="http', text)
         self.assertTrue((self.directory / "figures/roc.png").exists())
-
-
-class BestFirstTest(unittest.TestCase):
-    def test_finds_everything_in_the_end_and_the_easy_first(self) -> None:
-        scene = generator.make_scene(120, 600, 0.9, 1100, seed=2)
-        graph = make_truth([str(i) for i in range(120)], [tuple(e) for e in scene.edges])
-        points = best_first.curve(scene.vectors, graph, 120 * 119 // 2)
-        tests, recall = zip(*points)
-        self.assertEqual(points[-1], (120 * 119 // 2, 1.0))
-        self.assertEqual(list(tests), sorted(set(tests)))
-        self.assertGreater(np.interp(1500, tests, recall), 0.75)
 
 
 if __name__ == "__main__":

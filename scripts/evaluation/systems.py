@@ -71,6 +71,7 @@ def main_systems(tree_lists: Path | None, image_path: Path | None,
     systems += [System("graphmatch" if name == "fisher" else f"graphmatch_{name}",
                        f"GraphMatch ({label})", options, exports=name)
                 for name, label, options in descriptors(image_path)]
+    systems.append(System("best_first", "Best first (Fisher)", strategy("best_first")))
     if vectors_path is not None:
         systems.append(System("graphmatch_file", f"GraphMatch ({vectors_path.stem})",
                               *given_vectors(vectors_path)))
