@@ -11,14 +11,14 @@ namespace colmap_graphmatch {
 namespace {
 
 // The nearest images of each: tested to begin with, and candidates at any time later.
-constexpr std::size_t kNumFirst = 2;
+constexpr std::size_t kNumFirst = 1;
 constexpr std::size_t kNumNearest = 4;
 // Small batches choose best. A share of what was tested keeps the number of batches small, and
 // costs next to nothing (docs/evaluation_record.md).
 constexpr std::size_t kMinBatch = 100;
 constexpr std::size_t kTestsPerPairOfBatch = 20;
 // Tests after the first batch for each pair in it, as a guess.
-constexpr double kTestsPerFirst = 6;
+constexpr double kTestsPerFirst = 12;
 
 bool IsBeforePair(const Candidate& candidate, const VertexPair& pair) {
   return candidate.pair < pair;
@@ -74,7 +74,7 @@ std::vector<Candidate> BestFirstProposer::Likeliest(const MatchingGraph& graph) 
   double num_edges = 0;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const double probability = model_.Probability(candidates[i].cues);
-    if (probability < options_.min_edge_probability) continue;
+    if (probability < options_.min_edge_probability && !candidates[i].is_of_lonely) continue;
     likely.emplace_back(-probability, i);
     num_edges += probability;
   }

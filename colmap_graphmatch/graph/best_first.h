@@ -18,7 +18,7 @@ namespace colmap_graphmatch {
 
 struct BestFirstOptions {
   // Ends when no pair is as likely to be an edge. Greater than 0 and less than 1.
-  double min_edge_probability = 0.005;
+  double min_edge_probability = 0.01;
   PairRestrictions restrictions;
 
   // As GraphMatchOptions::Key.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <tuple>
 
 namespace colmap_graphmatch {
 namespace {
@@ -10,6 +10,8 @@ namespace {
 constexpr std::size_t kVerticesPerEvidenceTask = 16;
 // The distance to this place of a list is what others are compared with.
 constexpr std::size_t kUsualPlace = 10;
+// Tests after which an image without a neighbour is left to its likelihood.
+constexpr std::size_t kMaxTestsOfLonely = 40;
 
 // With a success and a failure that never were, so that few tests say little.
 double SuccessRate(std::size_t num_edges, std::size_t num_tested) {
@@ -26,19 +28,20 @@ class PairEvidence::OfVertex {
 
   void Collect(Vertex a, std::size_t num_nearest, std::vector<Candidate>* candidates) {
     WalkFrom(a);
-    const auto add = [&](Vertex c) {
-      candidates->push_back({MakeVertexPair(a, c), CuesWith(a, c, Test::kNone)});
+    const auto add = [&](Vertex c, bool is_of_lonely) {
+      candidates->push_back({MakeVertexPair(a, c), CuesWith(a, c, Test::kNone), is_of_lonely});
     };
     for (const Vertex c : touched_) {
       // From the smaller of the two alone.
-      if (entries_[c].num_common > 0 && a < c && MayBeTested(a, c)) add(c);
+      if (entries_[c].num_common > 0 && a < c && MayBeTested(a, c)) add(c, false);
     }
+    const bool is_lonely = graph_.Degree(a) == 0 && graph_.NumTestedOf(a) < kMaxTestsOfLonely;
     if (!evidence_.restrictions_.IsQuery(a)) return;
     const std::vector<Vertex>& nearest = evidence_.ranking_.NearestOf(a);
     for (std::size_t i = 0; i < nearest.size() && num_nearest > 0; ++i) {
       if (!MayBeTested(a, nearest[i])) continue;
       --num_nearest;
-      add(nearest[i]);
+      add(nearest[i], is_lonely);
     }
   }
 
@@ -195,8 +198,9 @@ std::vector<Candidate> PairEvidence::Collect(std::size_t num_nearest, const Matc
   for (const std::vector<Candidate>& part : parts) {
     candidates.insert(candidates.end(), part.begin(), part.end());
   }
-  std::sort(candidates.begin(), candidates.end(),
-            [](const Candidate& a, const Candidate& b) { return a.pair < b.pair; });
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return std::tie(a.pair, b.is_of_lonely) < std::tie(b.pair, a.is_of_lonely);
+  });
   candidates.erase(
       std::unique(candidates.begin(), candidates.end(),
                   [](const Candidate& a, const Candidate& b) { return a.pair == b.pair; }),

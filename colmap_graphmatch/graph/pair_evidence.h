@@ -18,6 +18,9 @@ namespace colmap_graphmatch {
 struct Candidate {
   VertexPair pair;
   Cues cues = {};
+  // One of its images has no neighbour yet and was tested with few: it draws on, however unlikely
+  // the pair is.
+  bool is_of_lonely = false;
 };
 
 // Collects what the ranking, the graph and the inliers say about pairs that were not tested.
