@@ -48,8 +48,6 @@ BestFirstProposer::BestFirstProposer(const BestFirstOptions& options, const Rank
   options.Check();
 }
 
-std::size_t BestFirstProposer::NumNearest() { return kNumNearest; }
-
 std::optional<Proposal> BestFirstProposer::Next(const MatchingGraph& graph) {
   if (graph.NumVertices() != ranking_.NumVertices()) {
     throw OptionsError("Every ranked image needs its id.");

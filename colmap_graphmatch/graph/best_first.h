@@ -42,9 +42,6 @@ class BestFirstProposer : public PairProposer {
   void OnKnown(const MatchingGraph& graph) override;
   ExpectedTests TestsAfter(const Proposal& proposal, const MatchingGraph& graph) const override;
 
-  // The images of its ranked list that it would test with each image if nothing matched.
-  static std::size_t NumNearest();
-
  private:
   // The next batch, once there are tests to learn from.
   std::vector<Candidate> Likeliest(const MatchingGraph& graph);

@@ -10,8 +10,6 @@ namespace {
 constexpr std::size_t kVerticesPerEvidenceTask = 16;
 // The distance to this place of a list is what others are compared with.
 constexpr std::size_t kUsualPlace = 10;
-// Tests after which an image without a neighbour is left to its likelihood.
-constexpr std::size_t kMaxTestsOfLonely = 40;
 
 // With a success and a failure that never were, so that few tests say little.
 double SuccessRate(std::size_t num_edges, std::size_t num_tested) {

@@ -26,6 +26,9 @@ struct Candidate {
 // Collects what the ranking, the graph and the inliers say about pairs that were not tested.
 class PairEvidence {
  public:
+  // Tests after which an image without a neighbour is left to its likelihood.
+  static constexpr std::size_t kMaxTestsOfLonely = 40;
+
   // All must outlive it.
   PairEvidence(const Ranking& ranking, const PairRestrictions& restrictions, ThreadPool& threads);
 
