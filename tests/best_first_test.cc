@@ -32,7 +32,8 @@ ExplorationResult RunBestFirst(const BestFirstOptions& options, const Ranking& r
   const std::vector<ImageId> ids = MakeIds(ranking.NumVertices());
   const auto make = [&] { return std::make_unique<BestFirstProposer>(options, ranking, threads); };
   const std::unique_ptr<PairProposer> proposer = make();
-  return Explore(*proposer, ids, *verifier, nullptr, {ChooseSeeds(make, ids, *verifier, {})});
+  return Explore(*proposer, ids, *verifier, nullptr,
+                 {ChooseSeeds(make, ids, *verifier, {}, StopRequest())});
 }
 
 // A graph of random tests with random inliers, and the same as plain sets.
@@ -359,6 +360,71 @@ TEST(BestFirst, EndsWhereThereIsNothingToFind) {
   RecordingVerifier verifier({});
   EXPECT_TRUE(RunBestFirst({}, unranked, &verifier).finished);
   EXPECT_THAT(verifier.tested, IsEmpty());
+}
+
+// All like each other in the order of their numbers, and the last one, which nobody lists.
+ListRanking MakeLonely(std::size_t num_vertices, std::size_t place_of_partner) {
+  std::vector<std::vector<ScoredVertex>> lists(num_vertices);
+  const auto lonely = static_cast<Vertex>(num_vertices - 1);
+  for (Vertex a = 0; a < lonely; ++a) {
+    for (Vertex b = 0; b < lonely; ++b) {
+      if (a != b) lists[a].push_back({b, -std::abs(static_cast<float>(a) - static_cast<float>(b))});
+    }
+    // Vertex 0 is at the place.
+    const std::size_t place = a == 0 ? place_of_partner : a <= place_of_partner ? a - 1 : a;
+    lists[lonely].push_back({a, -static_cast<float>(place)});
+  }
+  return ListRanking(lists);
+}
+
+TEST(BestFirst, ImagesWithoutAnEdgeDrawOnForAWhile) {
+  constexpr std::size_t kNum = 100;
+  const std::vector<ImageId> ids = MakeIds(kNum);
+  const ImagePair partner(ids[0], ids[kNum - 1]);
+  std::set<ImagePair> edges = {partner};
+  for (std::size_t i = 0; i + 1 < kNum; ++i) {
+    for (std::size_t j = i + 1; j < std::min(i + 4, kNum - 1); ++j) edges.emplace(ids[i], ids[j]);
+  }
+  const auto num_of_last = [&](const RecordingVerifier& verifier) {
+    return std::count_if(verifier.tested.begin(), verifier.tested.end(),
+                         [&](const ImagePair& pair) { return pair.id2 == ids.back(); });
+  };
+  RecordingVerifier near(edges);
+  RunBestFirst({}, MakeLonely(kNum, 30), &near);
+  EXPECT_EQ(std::count(near.tested.begin(), near.tested.end(), partner), 1);
+  RecordingVerifier far(edges);
+  RunBestFirst({}, MakeLonely(kNum, 90), &far);
+  EXPECT_EQ(std::count(far.tested.begin(), far.tested.end(), partner), 0);
+  EXPECT_GE(num_of_last(far), 40);
+  EXPECT_LT(num_of_last(far), 60);
+}
+
+TEST(BestFirst, UnlistedImagesAreNotTheNearest) {
+  std::vector<std::vector<ScoredVertex>> lists(4);
+  lists[0] = {{1, 3}, {2, 2}};
+  const ListRanking ranking(lists);
+  const PairRestrictions restrictions;
+  ThreadPool threads(1);
+  const PairEvidence evidence(ranking, restrictions, threads);
+  const MatchingGraph graph(4);
+  const std::vector<Candidate> candidates = evidence.Collect(5, graph, SharedTracks(4));
+  ASSERT_EQ(candidates.size(), 2U);
+  EXPECT_EQ(candidates[0].pair, VertexPair(0, 1));
+  EXPECT_EQ(candidates[0].cues[1], 1);  // Scores are no distances.
+  EXPECT_EQ(candidates[0].cues[2], 0);
+  EXPECT_EQ(candidates[0].cues[3], std::log1p(4));
+}
+
+TEST(BestFirst, GoesOnAfterFailedPairs) {
+  const Scene scene = MakeScene(4, 12, 3, 0.6, 8);
+  const VectorRanking ranking = MakeRanking(scene);
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  RecordingVerifier verifier(edges);
+  verifier.failing = {*edges.begin(), *edges.rbegin()};
+  const ExplorationResult result = RunBestFirst({}, ranking, &verifier);
+  EXPECT_TRUE(result.finished);
+  EXPECT_THAT(result.failed_pairs, ::testing::IsSubsetOf(verifier.failing));
+  EXPECT_GT(result.graph.NumEdges(), edges.size() / 2);
 }
 
 TEST(BestFirst, RefusesAProbabilityThatIsNone) {

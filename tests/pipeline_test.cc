@@ -186,6 +186,10 @@ TEST(LoopKey, StateFilesHaveItInTheseWords) {
   EXPECT_EQ(LoopKey(PipelineOptions(), PairRestrictions()),
             "loop: iterations 10, neighbors 120, propagated 4, tests 0, failed 0, seeking 0 0, "
             "frames 0 0, inliers 15");
+  PipelineOptions best_first;
+  best_first.strategy = PipelineOptions::Strategy::kBestFirst;
+  EXPECT_EQ(LoopKey(best_first, PairRestrictions()),
+            "best first: probability 0x1.47ae147ae147bp-7, seeking 0 0, frames 0 0, inliers 15");
 }
 
 TEST(Checkpoint, OneOfNothingKeepsNothing) {

@@ -194,9 +194,8 @@ void Table::AddGraph() {
       "images (>= 0) that each neighbour hands on to an image in an iteration");
   Add("GraphMatching.min_edge_probability",
       DoubleOf(&p.best_first.min_edge_probability, Zero::kNotAllowed),
-      "best_first ends when it thinks no pair as probable (> 0, < 1) to be an edge. Lower finds "
-      "weaker "
-      "links and costs more tests");
+      "best_first ends when it thinks no pair as probable (> 0, < 1) to be an edge. Less finds "
+      "weaker links and costs more tests");
   Add("GraphMatching.max_pairs", CountOf(&p.budget.max_pairs),
       "pairs (>= 0) that the run may test, the most promising of each batch first; a later run "
       "goes on; 0: no limit");

@@ -106,6 +106,12 @@ void BestFirstProposer::OnTested(const StageStatistics& /*batch*/) {
     tested_.push_back({proposed_[i].cues, are_edges_[i]});
   }
   proposed_.clear();
+  ForgetOldTests();
+}
+
+void BestFirstProposer::ForgetOldTests() {
+  if (tested_.size() < 2 * EdgeModel::kMaxTests) return;
+  tested_.erase(tested_.begin(), tested_.end() - static_cast<std::ptrdiff_t>(EdgeModel::kMaxTests));
 }
 
 void BestFirstProposer::OnKnown(const MatchingGraph& graph) {
@@ -114,6 +120,7 @@ void BestFirstProposer::OnKnown(const MatchingGraph& graph) {
   const std::vector<LabelledCues> known = evidence_.Describe(joining_, graph, tracks_);
   tested_.insert(tested_.end(), known.begin(), known.end());
   joining_.clear();
+  ForgetOldTests();
 }
 
 ExpectedTests BestFirstProposer::TestsAfter(const Proposal& /*proposal*/,

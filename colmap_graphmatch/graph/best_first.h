@@ -35,6 +35,8 @@ class BestFirstProposer : public PairProposer {
  public:
   // ranking and threads must outlive it. Throws OptionsError.
   BestFirstProposer(const BestFirstOptions& options, const Ranking& ranking, ThreadPool& threads);
+  BestFirstProposer(const BestFirstProposer&) = delete;
+  BestFirstProposer& operator=(const BestFirstProposer&) = delete;
 
   std::optional<Proposal> Next(const MatchingGraph& graph) override;
   void OnVerified(const TestedVertexPair& pair, const InlierReader& inliers) override;
@@ -45,6 +47,8 @@ class BestFirstProposer : public PairProposer {
  private:
   // The next batch, once there are tests to learn from.
   std::vector<Candidate> Likeliest(const MatchingGraph& graph);
+  // Keeps what the model looks at.
+  void ForgetOldTests();
 
   const BestFirstOptions options_;
   const Ranking& ranking_;
@@ -54,7 +58,7 @@ class BestFirstProposer : public PairProposer {
   std::vector<Candidate> proposed_;        // Ascending: the last proposal,
   std::vector<bool> are_edges_;            // and what became of it.
   std::vector<TestedVertexPair> joining_;  // Known pairs, which the graph is about to get.
-  std::vector<LabelledCues> tested_;       // What was known of pairs when they were proposed.
+  std::vector<LabelledCues> tested_;       // What was known of them when they were proposed.
   ExpectedTests expected_;
   int num_batches_ = 0;
 };

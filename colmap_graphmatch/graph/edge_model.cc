@@ -16,9 +16,6 @@ using Matrix = Eigen::Matrix<double, kNum, kNum>;
 constexpr double kPull = 1;
 constexpr int kMaxIterations = 30;
 constexpr double kTolerance = 1e-6;
-// Of all tests, more than enough for so few coefficients: the latest, which are most like those to
-// come.
-constexpr std::size_t kMaxTests = 20000;
 
 double Sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 

@@ -19,6 +19,10 @@ struct LabelledCues {
 // The probability that a pair is an edge, by logistic regression.
 class EdgeModel {
  public:
+  // Tests that are looked at, the last ones: more than enough for so few coefficients, and most
+  // like those to come.
+  static constexpr std::size_t kMaxTests = 20000;
+
   // Fits it to pairs that were tested, in their order, by Newton's method with a weak pull of all
   // coefficients towards zero: so it also works where all are edges, or none. Deterministic.
   void Fit(const std::vector<LabelledCues>& tested);

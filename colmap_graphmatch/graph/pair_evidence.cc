@@ -7,7 +7,8 @@
 namespace colmap_graphmatch {
 namespace {
 
-constexpr std::size_t kVerticesPerEvidenceTask = 16;
+// Enough to make up for the entries of OfVertex.
+constexpr std::size_t kVerticesPerEvidenceTask = 64;
 // The distance to this place of a list is what others are compared with.
 constexpr std::size_t kUsualPlace = 10;
 
@@ -127,13 +128,11 @@ class PairEvidence::OfVertex {
     const std::size_t least_degree = std::min(degree(a), degree(c));
     const std::size_t ranks[] = {evidence_.RankOf(a, c), evidence_.RankOf(c, a)};
     const double rates[] = {rate(a), rate(c)};
-    const double usual = std::sqrt(evidence_.usual_distances_[a] * evidence_.usual_distances_[c]);
-    const double distance = evidence_.ranking_.Distance(a, c);
     const auto num_common = static_cast<double>(entry.num_common);
     const auto num_failed = static_cast<double>(entry.num_failed);
     const auto log = [](std::size_t number) { return std::log1p(static_cast<double>(number)); };
     return {1,
-            usual > 0 ? std::min(distance / usual, 3.0) : 1,
+            RelativeDistance(a, c),
             log(std::min(ranks[0], ranks[1])),
             log(std::max(ranks[0], ranks[1])),
             log(entry.most_shared),
@@ -143,6 +142,16 @@ class PairEvidence::OfVertex {
             num_failed / (num_failed + 2 * num_common + 1),
             std::min(rates[0], rates[1]),
             std::max(rates[0], rates[1])};
+  }
+
+  // 1 is usual. So it is where distances are none: scores of other programs may have any sign.
+  double RelativeDistance(Vertex a, Vertex c) const {
+    const double usual_of_a = evidence_.usual_distances_[a];
+    const double usual_of_c = evidence_.usual_distances_[c];
+    if (!(usual_of_a > 0 && usual_of_c > 0)) return 1;
+    constexpr double kMost = 3;
+    return std::clamp(evidence_.ranking_.Distance(a, c) / std::sqrt(usual_of_a * usual_of_c),
+                      -kMost, kMost);
   }
 
   const PairEvidence& evidence_;
@@ -176,7 +185,7 @@ std::size_t PairEvidence::RankOf(Vertex listed, Vertex vertex) const {
   const auto& places = places_[vertex];
   const auto found =
       std::lower_bound(places.begin(), places.end(), std::make_pair(listed, std::uint32_t{0}));
-  return found != places.end() && found->first == listed ? found->second : places.size();
+  return found != places.end() && found->first == listed ? found->second : ranking_.NumVertices();
 }
 
 std::vector<Candidate> PairEvidence::Collect(std::size_t num_nearest, const MatchingGraph& graph,

@@ -46,8 +46,7 @@ class PairEvidence {
  private:
   class OfVertex;
 
-  // The place of an image in the list of another, counted from 0; that behind the last one if it is
-  // not listed.
+  // The place of an image in the list of another, counted from 0; behind all if it is not listed.
   std::size_t RankOf(Vertex listed, Vertex vertex) const;
 
   const Ranking& ranking_;

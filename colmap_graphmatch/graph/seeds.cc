@@ -1,24 +1,34 @@
 #include "colmap_graphmatch/graph/seeds.h"
 
+#include <algorithm>
+
 #include "colmap_graphmatch/graph/explorer.h"
 
 namespace colmap_graphmatch {
 namespace {
 
-// Answers what was known before the run and takes everything else for no edge.
+// Answers what was known before the run and takes everything else for no edge. Ends once all is
+// asked for: what would come then tells nothing more.
 class KnownOnly : public PairVerifier {
  public:
-  explicit KnownOnly(PairVerifier& verifier) : verifier_(verifier), known_(verifier.KnownPairs()) {}
+  // num_to_ask_for: those of the known pairs that end it.
+  KnownOnly(PairVerifier& verifier, std::size_t num_to_ask_for, const StopRequest& stop)
+      : verifier_(verifier),
+        known_(verifier.KnownPairs()),
+        num_to_ask_for_(num_to_ask_for),
+        stop_(stop) {}
 
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_; }
 
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override {
+    stop_.ThrowIfRequested();
     for (const ImagePair& pair : pairs) {
       const VerifiedPair* known = FindPair(known_, pair);
+      if (known != nullptr) ++num_asked_for_;
       on_verified(known != nullptr ? *known : VerifiedPair{pair});
     }
-    return true;
+    return num_asked_for_ < num_to_ask_for_;
   }
 
   const FeatureMatches& Inliers(const ImagePair& pair) override { return verifier_.Inliers(pair); }
@@ -26,6 +36,9 @@ class KnownOnly : public PairVerifier {
  private:
   PairVerifier& verifier_;
   const std::vector<VerifiedPair>& known_;
+  std::size_t num_to_ask_for_;
+  std::size_t num_asked_for_ = 0;
+  const StopRequest& stop_;
 };
 
 class ProposesNothing : public PairProposer {
@@ -38,14 +51,15 @@ class ProposesNothing : public PairProposer {
 std::vector<ImagePair> ChooseSeeds(
     const std::function<std::unique_ptr<PairProposer>()>& make_proposer,
     const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-    const std::vector<ImagePair>& earlier_seeds) {
+    const std::vector<ImagePair>& earlier_seeds, const StopRequest& stop) {
   if (verifier.KnownPairs().empty()) return {};
-  KnownOnly known_only(verifier);
   const OnProgress silent;
   ProposesNothing nothing;
-  const std::size_t num_known = Explore(nothing, image_ids, known_only, silent).num_seed_pairs;
+  KnownOnly all_known(verifier, 0, stop);
+  const std::size_t num_known = Explore(nothing, image_ids, all_known, silent).num_seed_pairs;
   const auto asks_for_all_known = [&](const std::vector<ImagePair>& seeds) {
     const std::unique_ptr<PairProposer> proposer = make_proposer();
+    KnownOnly known_only(verifier, num_known - std::min(num_known, seeds.size()), stop);
     KnownPairsPolicy seeds_alone;
     seeds_alone.seeds = seeds;
     seeds_alone.others_join_in_the_end = false;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/stop_request.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/graph/pair_proposer.h"
 
@@ -17,9 +18,10 @@ namespace colmap_graphmatch {
 // proposer that make_proposer makes, started from the earlier seeds (those of the run that may have
 // been interrupted; ascending) or from none, asks for everything that is known, these are the
 // seeds. Otherwise another matcher tested pairs, or images were added, and all known pairs are.
+// Throws StoppedError if stop asks for it.
 std::vector<ImagePair> ChooseSeeds(
     const std::function<std::unique_ptr<PairProposer>()>& make_proposer,
     const std::vector<ImageId>& image_ids, PairVerifier& verifier,
-    const std::vector<ImagePair>& earlier_seeds);
+    const std::vector<ImagePair>& earlier_seeds, const StopRequest& stop);
 
 }  // namespace colmap_graphmatch

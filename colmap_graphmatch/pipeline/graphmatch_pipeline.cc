@@ -156,7 +156,7 @@ KnownPairsPolicy Pipeline::ChooseKnown() {
   if (!options_.RanksImages() || !StartsFromSeeds(options_.strategy)) return known;
   const std::string key = LoopKey(options_, restrictions_);
   known.seeds = ChooseSeeds([this] { return NewProposer(); }, ids_, verification_->Verifier(),
-                            setup_.checkpoint.ReadSeeds(key));
+                            setup_.checkpoint.ReadSeeds(key), setup_.stop);
   setup_.checkpoint.KeepSeeds(key, known.seeds);
   return known;
 }

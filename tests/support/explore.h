@@ -20,7 +20,7 @@ inline std::vector<ImagePair> ChooseGraphMatchSeeds(const GraphMatchOptions& opt
                                                     PairVerifier& verifier, ThreadPool& threads,
                                                     const std::vector<ImagePair>& earlier) {
   const auto make = [&] { return std::make_unique<GraphMatchProposer>(options, ranking, threads); };
-  return ChooseSeeds(make, ids, verifier, earlier);
+  return ChooseSeeds(make, ids, verifier, earlier, StopRequest());
 }
 
 inline ExplorationResult RunGraphMatch(const GraphMatchOptions& options, const Ranking& ranking,

@@ -997,8 +997,8 @@ function explainAlone({image, features, failed = 0, candidates}) {
       'between the two could join them.');
   } else {
     texts.push('None of those that look most like it shares enough with it. It is the only photo of its place, or ' +
-      'those that would match it look too different: more photos around it help, or a higher ' +
-      '--GraphMatching.max_tests_for_sampling.');
+      'those that would match it look too different: more photos around it help' +
+      (report.strategy === 'graphmatch' ? ', or a higher --GraphMatching.max_tests_for_sampling.' : '.'));
   }
   if (features > 0 && features < 200) {
     texts.push(`It has few features (${count(features)}): little texture, blur, or a small photo.`);
