@@ -431,7 +431,8 @@ TEST(Console, NamesGiveNoOrdersToTheTerminal) {
 TEST(OptionValues, WordsOfAnEnumAreListedInOrder) {
   PipelineOptions::Strategy strategy = PipelineOptions::Strategy::kRetrieval;
   const Value value = OneOf(&strategy, kStrategyWords);
-  EXPECT_EQ(value.values, "one of briad, exhaustive, graphmatch, propagation, retrieval, sampling");
+  EXPECT_EQ(value.values,
+            "one of best_first, briad, exhaustive, graphmatch, propagation, retrieval, sampling");
   EXPECT_EQ(value.default_value, "retrieval");
   EXPECT_TRUE(value.read("briad"));
   EXPECT_EQ(strategy, PipelineOptions::Strategy::kBriad);
