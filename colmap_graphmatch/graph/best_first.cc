@@ -1,11 +1,9 @@
 #include "colmap_graphmatch/graph/best_first.h"
 
 #include <algorithm>
-#include <string>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
-#include "colmap_graphmatch/base/exact_text.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -25,19 +23,6 @@ bool IsBeforePair(const Candidate& candidate, const VertexPair& pair) {
 }
 
 }  // namespace
-
-std::string BestFirstOptions::Key() const {
-  const auto& [probability, pairs] = *this;  // Does not compile if a field is forgotten.
-  return "probability " + ExactText(probability) + ", " + pairs.Key();
-}
-
-void BestFirstOptions::Check() const {
-  if (!(min_edge_probability > 0 && min_edge_probability < 1)) {
-    throw OptionsError("GraphMatching.min_edge_probability is " +
-                       std::to_string(min_edge_probability) +
-                       "; it must be greater than 0 and less than 1.");
-  }
-}
 
 BestFirstProposer::BestFirstProposer(const BestFirstOptions& options, const Ranking& ranking,
                                      ThreadPool& threads)

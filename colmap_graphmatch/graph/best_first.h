@@ -2,31 +2,18 @@
 
 #include <cstddef>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/graph/edge_model.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
+#include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/graph/pair_evidence.h"
 #include "colmap_graphmatch/graph/pair_proposer.h"
-#include "colmap_graphmatch/graph/pair_restrictions.h"
 #include "colmap_graphmatch/graph/shared_tracks.h"
 #include "colmap_graphmatch/ranking/ranking.h"
 
 namespace colmap_graphmatch {
-
-struct BestFirstOptions {
-  // Ends when no pair is as likely to be an edge. Greater than 0 and less than 1.
-  double min_edge_probability = 0.01;
-  PairRestrictions restrictions;
-
-  // As GraphMatchOptions::Key.
-  std::string Key() const;
-
-  // Throws OptionsError.
-  void Check() const;
-};
 
 // The paper's two moves, sampling and propagation (GraphMatch, section 3), over one queue: of all
 // pairs that either could test, the likeliest are tested next. How likely a pair is, a model of the

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/base/exact_text.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -41,6 +42,19 @@ void GraphMatchOptions::Check() const {
   CheckAtLeast("num_to_propagate", num_to_propagate, 0);
   CheckAtLeast("max_tests_for_sampling", max_tests_for_sampling, 0);
   CheckAtLeast("max_failed_samples", max_failed_samples, 0);
+}
+
+std::string BestFirstOptions::Key() const {
+  const auto& [probability, pairs] = *this;  // Does not compile if a field is forgotten.
+  return "probability " + ExactText(probability) + ", " + pairs.Key();
+}
+
+void BestFirstOptions::Check() const {
+  if (!(min_edge_probability > 0 && min_edge_probability < 1)) {
+    throw OptionsError("GraphMatching.min_edge_probability is " +
+                       std::to_string(min_edge_probability) +
+                       "; it must be greater than 0 and less than 1.");
+  }
 }
 
 }  // namespace colmap_graphmatch

@@ -50,4 +50,17 @@ struct GraphMatchOptions {
   void Check() const;
 };
 
+// Of the strategy that tests the likeliest pairs next (graph/best_first.h).
+struct BestFirstOptions {
+  // Ends when no pair is as likely to be an edge. Greater than 0 and less than 1.
+  double min_edge_probability = 0.01;
+  PairRestrictions restrictions;
+
+  // As GraphMatchOptions::Key.
+  std::string Key() const;
+
+  // Throws OptionsError.
+  void Check() const;
+};
+
 }  // namespace colmap_graphmatch

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "colmap_graphmatch/base/enum_words.h"
-#include "colmap_graphmatch/graph/best_first.h"
 #include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/vectors/options.h"
 #include "colmap_graphmatch/verification/options.h"
