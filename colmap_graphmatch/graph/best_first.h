@@ -22,6 +22,7 @@ class BestFirstProposer : public PairProposer {
  public:
   // ranking and threads must outlive it. Throws OptionsError.
   BestFirstProposer(const BestFirstOptions& options, const Ranking& ranking, ThreadPool& threads);
+  ~BestFirstProposer() override = default;
   BestFirstProposer(const BestFirstProposer&) = delete;
   BestFirstProposer& operator=(const BestFirstProposer&) = delete;
 
