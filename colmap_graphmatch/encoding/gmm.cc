@@ -1,9 +1,7 @@
 #include "colmap_graphmatch/encoding/gmm.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/base/exact_text.h"

@@ -5,9 +5,10 @@
 
 namespace colmap_graphmatch {
 
-// Who proposed a pair. kSampling, kPropagation: the paper's loop. kListed: the pairs were given
-// beforehand, or are all. kRetrieval: the ranking, kExpansion: query expansion after it.
-// kLikeliest: a model of what was tested before. kLast is another name of the last one.
+// Who proposed a pair. kSampling, kPropagation: the paper's loop; the first batch of best first is
+// kSampling, too. kListed: the pairs were given beforehand, or are all. kRetrieval: the ranking,
+// kExpansion: query expansion after it. kLikeliest: best first, by a model of what was tested
+// before. kLast is another name of the last one.
 enum class LoopStage {
   kSampling,
   kPropagation,
