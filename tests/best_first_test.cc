@@ -119,62 +119,128 @@ TEST(SharedTracks, CountsFeaturesThatAreInliersOfBothEdges) {
   tracks.Add({0, 1}, {{0, 5}, {1, 70}, {2, 9}});
   tracks.Add({1, 2}, {{70, 3}, {9, 4}, {8, 5}});
   tracks.Add({1, 3}, {{8, 1}});
-  std::vector<std::pair<Vertex, std::size_t>> visited;
-  const auto visit = [&](Vertex c, std::size_t num) { visited.emplace_back(c, num); };
-  tracks.VisitThrough(0, 1, visit);
-  EXPECT_THAT(visited, ElementsAre(std::make_pair(Vertex{2}, std::size_t{2})));
-  visited.clear();
-  tracks.VisitThrough(3, 1, visit);
-  EXPECT_THAT(visited, ElementsAre(std::make_pair(Vertex{2}, std::size_t{1})));
-  visited.clear();
-  tracks.VisitThrough(0, 2, visit);  // Not an edge.
-  EXPECT_THAT(visited, IsEmpty());
+  const auto count = [&](Vertex a, Vertex b, Vertex c) {
+    return SharedTracks::CountShared(tracks.Inliers(b, a), tracks.Inliers(b, c));
+  };
+  EXPECT_EQ(count(0, 1, 2), 2U);
+  EXPECT_EQ(count(3, 1, 2), 1U);
+  EXPECT_EQ(count(0, 1, 3), 0U);
+  EXPECT_EQ(count(0, 2, 1), 0U);  // 0 and 2 are no edge.
+}
+
+TEST(SharedTracks, CountsEveryFeatureOfLargeImages) {
+  Random random({9});
+  for (const std::uint32_t num_features : {1U, 63U, 64U, 65U, 1000U, 8192U}) {
+    SharedTracks tracks(3);
+    FeatureMatches of_first;
+    FeatureMatches of_second;
+    std::size_t num_shared = 0;
+    for (std::uint32_t feature = 0; feature < num_features; ++feature) {
+      const bool in_first = random.Uniform() < 0.7;
+      const bool in_second = random.Uniform() < 0.7;
+      if (in_first) of_first.push_back({0, feature});
+      if (in_second) of_second.push_back({feature, 0});
+      if (in_first && in_second) ++num_shared;
+    }
+    tracks.Add({0, 1}, of_first);
+    tracks.Add({1, 2}, of_second);
+    EXPECT_EQ(SharedTracks::CountShared(tracks.Inliers(1, 0), tracks.Inliers(1, 2)), num_shared);
+  }
 }
 
 TEST(SharedTracks, FeaturesThatNoImageHasTakeNoMemory) {
   SharedTracks tracks(3);
   tracks.Add({0, 1}, {{0xFFFFFFFF, 0xFFFFFFFF}});
-  tracks.Add({1, 2}, {{0xFFFFFFFF, 0xFFFFFFFF}});
-  tracks.VisitThrough(0, 1, [](Vertex, std::size_t) { FAIL(); });
+  EXPECT_THAT(tracks.Inliers(0, 1), IsEmpty());
+  EXPECT_THAT(tracks.Inliers(1, 0), IsEmpty());
 }
 
-TEST(PairEvidence, CollectsWhatTheDefinitionsSay) {
+// Tells the evidence of the tests of a random graph, in so many steps.
+void AddInSteps(const RandomGraph& random, std::size_t num_steps, PairEvidence* evidence) {
+  RandomGraph part;
+  part.graph = MatchingGraph(random.graph.NumVertices());
+  part.tracks = SharedTracks(random.graph.NumVertices());
+  for (std::size_t step = 0; step < num_steps; ++step) {
+    std::vector<TestedVertexPair> tests;
+    for (std::size_t i = step; i < random.tested.size(); i += num_steps) {
+      tests.push_back(random.tested[i]);
+      if (tests.back().is_edge) {
+        part.tracks.Add(tests.back().pair, random.inliers.at(tests.back().pair));
+      }
+    }
+    part.graph.Add(tests);
+    evidence->Add(tests, part.graph, part.tracks);
+  }
+}
+
+std::vector<Candidate> Collect(const PairEvidence& evidence, std::size_t num_nearest,
+                               const MatchingGraph& graph) {
+  std::vector<std::vector<Candidate>> parts(evidence.NumTasks());
+  evidence.VisitCandidates(num_nearest, graph, [&](std::size_t task, const Candidate& candidate) {
+    parts[task].push_back(candidate);
+  });
+  std::vector<Candidate> candidates;
+  for (const std::vector<Candidate>& part : parts) {
+    candidates.insert(candidates.end(), part.begin(), part.end());
+  }
+  return candidates;
+}
+
+PairRestrictions EveryThirdIsAQuery(std::size_t num_vertices) {
+  PairRestrictions restrictions;
+  restrictions.queries.resize(num_vertices);
+  restrictions.frames.resize(num_vertices);
+  for (std::size_t i = 0; i < num_vertices; ++i) {
+    restrictions.queries[i] = i % 3 == 0;
+    restrictions.frames[i] = static_cast<std::uint32_t>(i / 4);
+  }
+  return restrictions;
+}
+
+TEST(PairEvidence, VisitsWhatTheDefinitionsSay) {
   const Scene scene = MakeScene(4, 8, 3, 0.5, 1);
   const VectorRanking ranking = MakeRanking(scene);
-  const PairRestrictions restrictions;
   ThreadPool threads(2);
-  const PairEvidence evidence(ranking, restrictions, threads);
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    const RandomGraph random = MakeRandomGraph(scene.num_vertices, 0.15, seed);
-    std::set<VertexPair> expected;
-    for (Vertex a = 0; a < scene.num_vertices; ++a) {
-      for (Vertex c = a + 1; c < scene.num_vertices; ++c) {
-        if (random.graph.IsTested(a, c)) continue;
-        if (CountPlainly(random, a, c).num_common > 0) expected.emplace(a, c);
+  for (const PairRestrictions& restrictions :
+       {PairRestrictions(), EveryThirdIsAQuery(scene.num_vertices)}) {
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      const RandomGraph random = MakeRandomGraph(scene.num_vertices, 0.15, seed);
+      PairEvidence evidence(ranking, restrictions, threads);
+      AddInSteps(random, seed, &evidence);
+      const auto may_be_tested = [&](Vertex a, Vertex c) {
+        return a != c && restrictions.Allows(a, c) && !random.graph.IsTested(a, c);
+      };
+      std::set<VertexPair> expected;
+      for (Vertex a = 0; a < scene.num_vertices; ++a) {
+        for (Vertex c = a + 1; c < scene.num_vertices; ++c) {
+          if (!may_be_tested(a, c)) continue;
+          if (CountPlainly(random, a, c).num_common > 0) expected.emplace(a, c);
+        }
+        int num_nearest = 0;
+        for (const Vertex c : ranking.NearestOf(a)) {
+          if (num_nearest == 3 || !restrictions.IsQuery(a)) break;
+          if (!may_be_tested(a, c)) continue;
+          expected.insert(MakeVertexPair(a, c));
+          ++num_nearest;
+        }
       }
-      int num_nearest = 0;
-      for (const Vertex c : ranking.NearestOf(a)) {
-        if (num_nearest == 3) break;
-        if (random.graph.IsTested(a, c)) continue;
-        expected.insert(MakeVertexPair(a, c));
-        ++num_nearest;
+      std::set<VertexPair> visited;
+      for (const Candidate& candidate : Collect(evidence, 3, random.graph)) {
+        const auto [a, c] = candidate.pair;
+        EXPECT_TRUE(visited.emplace(a, c).second);
+        EXPECT_EQ(candidate.cues, evidence.Of(candidate.pair, random.graph));
+        const Counts counts = CountPlainly(random, a, c);
+        EXPECT_EQ(candidate.cues[4], std::log1p(counts.most_shared));
+        EXPECT_EQ(candidate.cues[5], std::log1p(counts.num_shared));
+        EXPECT_EQ(candidate.cues[6], std::log1p(counts.num_common));
+        const double least_degree =
+            static_cast<double>(std::min(random.graph.Degree(a), random.graph.Degree(c)));
+        EXPECT_EQ(candidate.cues[7], counts.num_common / (least_degree + 1));
+        EXPECT_EQ(candidate.cues[8],
+                  counts.num_failed / (counts.num_failed + 2 * counts.num_common + 1));
       }
+      EXPECT_EQ(visited, expected);
     }
-    std::set<VertexPair> collected;
-    for (const Candidate& candidate : evidence.Collect(3, random.graph, random.tracks)) {
-      const auto [a, c] = candidate.pair;
-      EXPECT_TRUE(collected.emplace(a, c).second);
-      const Counts counts = CountPlainly(random, a, c);
-      EXPECT_EQ(candidate.cues[4], std::log1p(counts.most_shared));
-      EXPECT_EQ(candidate.cues[5], std::log1p(counts.num_shared));
-      EXPECT_EQ(candidate.cues[6], std::log1p(counts.num_common));
-      const double least_degree =
-          static_cast<double>(std::min(random.graph.Degree(a), random.graph.Degree(c)));
-      EXPECT_EQ(candidate.cues[7], counts.num_common / (least_degree + 1));
-      EXPECT_EQ(candidate.cues[8],
-                counts.num_failed / (counts.num_failed + 2 * counts.num_common + 1));
-    }
-    EXPECT_EQ(collected, expected);
   }
 }
 
@@ -183,23 +249,19 @@ TEST(PairEvidence, OfATestedPairDoesNotKnowOfTheTest) {
   const VectorRanking ranking = MakeRanking(scene);
   const PairRestrictions restrictions;
   ThreadPool threads(2);
-  const PairEvidence evidence(ranking, restrictions, threads);
   const RandomGraph whole = MakeRandomGraph(scene.num_vertices, 0.3, 7);
-  const std::vector<LabelledCues> described =
-      evidence.Describe(whole.tested, whole.graph, whole.tracks);
+  PairEvidence evidence(ranking, restrictions, threads);
+  AddInSteps(whole, 2, &evidence);
+  const std::vector<LabelledCues> described = evidence.WithoutThem(whole.tested, whole.graph);
   ASSERT_EQ(described.size(), whole.tested.size());
-  int num_compared = 0;
   for (std::size_t i = 0; i < whole.tested.size(); ++i) {
     EXPECT_EQ(described[i].is_edge, whole.tested[i].is_edge);
-    const RandomGraph without = MakeRandomGraph(scene.num_vertices, 0.3, 7, {whole.tested[i].pair});
-    for (const Candidate& candidate :
-         evidence.Collect(scene.num_vertices, without.graph, without.tracks)) {
-      if (candidate.pair != whole.tested[i].pair) continue;
-      EXPECT_EQ(candidate.cues, described[i].cues);
-      ++num_compared;
-    }
+    const VertexPair& pair = whole.tested[i].pair;
+    const RandomGraph without = MakeRandomGraph(scene.num_vertices, 0.3, 7, {pair});
+    PairEvidence evidence_without(ranking, restrictions, threads);
+    AddInSteps(without, 1, &evidence_without);
+    EXPECT_EQ(evidence_without.Of(pair, without.graph), described[i].cues);
   }
-  EXPECT_EQ(num_compared, static_cast<int>(whole.tested.size()));
 }
 
 TEST(EdgeModel, FindsTheCoefficientsThatMadeTheTests) {
@@ -407,7 +469,7 @@ TEST(BestFirst, UnlistedImagesAreNotTheNearest) {
   ThreadPool threads(1);
   const PairEvidence evidence(ranking, restrictions, threads);
   const MatchingGraph graph(4);
-  const std::vector<Candidate> candidates = evidence.Collect(5, graph, SharedTracks(4));
+  const std::vector<Candidate> candidates = Collect(evidence, 5, graph);
   ASSERT_EQ(candidates.size(), 2U);
   EXPECT_EQ(candidates[0].pair, VertexPair(0, 1));
   EXPECT_EQ(candidates[0].cues[1], 1);  // Scores are no distances.

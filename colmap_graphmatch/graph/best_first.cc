@@ -1,6 +1,8 @@
 #include "colmap_graphmatch/graph/best_first.h"
 
 #include <algorithm>
+#include <limits>
+#include <tuple>
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
@@ -18,8 +20,13 @@ constexpr std::size_t kTestsPerPairOfBatch = 20;
 // Tests after the first batch for each pair in it, as a guess.
 constexpr double kTestsPerFirst = 12;
 
-bool IsBeforePair(const Candidate& candidate, const VertexPair& pair) {
-  return candidate.pair < pair;
+struct LikelyPair {
+  double probability = 0;
+  VertexPair pair;
+};
+
+bool IsLikelier(const LikelyPair& a, const LikelyPair& b) {
+  return std::tie(b.probability, a.pair) < std::tie(a.probability, b.pair);
 }
 
 }  // namespace
@@ -28,6 +35,7 @@ BestFirstProposer::BestFirstProposer(const BestFirstOptions& options, const Rank
                                      ThreadPool& threads)
     : options_(options),
       ranking_(ranking),
+      threads_(threads),
       evidence_(ranking, options_.restrictions, threads),
       tracks_(ranking.NumVertices()) {
   options.Check();
@@ -37,75 +45,89 @@ std::optional<Proposal> BestFirstProposer::Next(const MatchingGraph& graph) {
   if (graph.NumVertices() != ranking_.NumVertices()) {
     throw OptionsError("Every ranked image needs its id.");
   }
+  TakeNote(graph);
   Proposal proposal;
   proposal.iteration = num_batches_;
-  proposal.stage = tested_.empty() ? LoopStage::kSampling : LoopStage::kLikeliest;
-  proposed_ = tested_.empty() ? evidence_.Collect(kNumFirst, graph, tracks_) : Likeliest(graph);
-  if (proposed_.empty()) return std::nullopt;
+  if (tested_.empty()) {
+    proposal.stage = LoopStage::kSampling;
+    proposal.pairs = Likeliest(std::numeric_limits<std::size_t>::max(), kNumFirst, 0, graph);
+    expected_.all = kTestsPerFirst * static_cast<double>(proposal.pairs.size());
+  } else {
+    proposal.stage = LoopStage::kLikeliest;
+    model_.Fit(tested_);
+    proposal.pairs = Likeliest(std::max(kMinBatch, graph.NumTested() / kTestsPerPairOfBatch),
+                               kNumNearest, options_.min_edge_probability, graph);
+  }
+  if (proposal.pairs.empty()) return std::nullopt;
   ++num_batches_;
-  if (tested_.empty()) expected_.all = kTestsPerFirst * static_cast<double>(proposed_.size());
-  are_edges_.assign(proposed_.size(), false);
-  proposal.pairs.reserve(proposed_.size());
-  for (const Candidate& candidate : proposed_) proposal.pairs.push_back(candidate.pair);
+  pairs_ = proposal.pairs;
+  proposed_.resize(pairs_.size());
+  threads_.ParallelFor(pairs_.size(),
+                       [&](std::size_t i) { proposed_[i] = {evidence_.Of(pairs_[i], graph)}; });
   return proposal;
 }
 
-std::vector<Candidate> BestFirstProposer::Likeliest(const MatchingGraph& graph) {
-  model_.Fit(tested_);
-  const std::vector<Candidate> candidates = evidence_.Collect(kNumNearest, graph, tracks_);
-  std::vector<std::pair<double, std::size_t>> likely;  // Of equal ones the smaller pair first.
+std::vector<VertexPair> BestFirstProposer::Likeliest(std::size_t num, std::size_t num_nearest,
+                                                     double min_probability,
+                                                     const MatchingGraph& graph) {
+  std::vector<std::vector<LikelyPair>> parts(evidence_.NumTasks());
+  evidence_.VisitCandidates(num_nearest, graph, [&](std::size_t task, const Candidate& candidate) {
+    const double probability = model_.Probability(candidate.cues);
+    if (probability < min_probability && !candidate.is_of_lonely) return;
+    parts[task].push_back({probability, candidate.pair});
+  });
+  std::vector<LikelyPair> likely;
   double num_edges = 0;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const double probability = model_.Probability(candidates[i].cues);
-    if (probability < options_.min_edge_probability && !candidates[i].is_of_lonely) continue;
-    likely.emplace_back(-probability, i);
-    num_edges += probability;
+  for (std::vector<LikelyPair>& part : parts) {
+    for (const LikelyPair& pair : part) num_edges += pair.probability;
+    likely.insert(likely.end(), part.begin(), part.end());
+    part = {};
   }
-  const std::size_t num =
-      std::min(likely.size(), std::max(kMinBatch, graph.NumTested() / kTestsPerPairOfBatch));
+  num = std::min(num, likely.size());
   // Every edge makes about one more pair likely.
   expected_.all = static_cast<double>(likely.size() - num) + num_edges;
-  const auto end = likely.begin() + static_cast<std::ptrdiff_t>(num);
-  std::nth_element(likely.begin(), end, likely.end());
-  std::vector<Candidate> likeliest;
-  likeliest.reserve(num);
-  std::for_each(likely.begin(), end,
-                [&](const auto& entry) { likeliest.push_back(candidates[entry.second]); });
-  std::sort(likeliest.begin(), likeliest.end(),
-            [](const Candidate& a, const Candidate& b) { return a.pair < b.pair; });
+  std::nth_element(likely.begin(), likely.begin() + static_cast<std::ptrdiff_t>(num), likely.end(),
+                   IsLikelier);
+  std::vector<VertexPair> likeliest(num);
+  for (std::size_t i = 0; i < num; ++i) likeliest[i] = likely[i].pair;
+  std::sort(likeliest.begin(), likeliest.end());
   return likeliest;
 }
 
 void BestFirstProposer::OnVerified(const TestedVertexPair& pair, const InlierReader& inliers) {
   if (pair.is_edge) tracks_.Add(pair.pair, inliers());
-  const auto found = std::lower_bound(proposed_.begin(), proposed_.end(), pair.pair, IsBeforePair);
-  if (found == proposed_.end() || found->pair != pair.pair) {
-    joining_.push_back(pair);
+  joining_.push_back(pair);
+  const auto found = std::lower_bound(pairs_.begin(), pairs_.end(), pair.pair);
+  if (found == pairs_.end() || *found != pair.pair) {
+    known_.push_back(pair);
   } else {
-    are_edges_[static_cast<std::size_t>(found - proposed_.begin())] = pair.is_edge;
+    proposed_[static_cast<std::size_t>(found - pairs_.begin())].is_edge = pair.is_edge;
   }
 }
 
 void BestFirstProposer::OnTested(const StageStatistics& /*batch*/) {
-  for (std::size_t i = 0; i < proposed_.size(); ++i) {
-    tested_.push_back({proposed_[i].cues, are_edges_[i]});
-  }
-  proposed_.clear();
-  ForgetOldTests();
-}
-
-void BestFirstProposer::ForgetOldTests() {
-  if (tested_.size() < 2 * EdgeModel::kMaxTests) return;
-  tested_.erase(tested_.begin(), tested_.end() - static_cast<std::ptrdiff_t>(EdgeModel::kMaxTests));
+  Learn(proposed_);
+  pairs_.clear();
 }
 
 void BestFirstProposer::OnKnown(const MatchingGraph& graph) {
-  std::sort(joining_.begin(), joining_.end(),
+  TakeNote(graph);
+  std::sort(known_.begin(), known_.end(),
             [](const TestedVertexPair& a, const TestedVertexPair& b) { return a.pair < b.pair; });
-  const std::vector<LabelledCues> known = evidence_.Describe(joining_, graph, tracks_);
-  tested_.insert(tested_.end(), known.begin(), known.end());
+  Learn(evidence_.WithoutThem(known_, graph));
+  known_.clear();
+}
+
+void BestFirstProposer::TakeNote(const MatchingGraph& graph) {
+  evidence_.Add(joining_, graph, tracks_);
   joining_.clear();
-  ForgetOldTests();
+}
+
+void BestFirstProposer::Learn(const std::vector<LabelledCues>& tests) {
+  tested_.insert(tested_.end(), tests.begin(), tests.end());
+  // The model looks at no more.
+  if (tested_.size() < 2 * EdgeModel::kMaxTests) return;
+  tested_.erase(tested_.begin(), tested_.end() - static_cast<std::ptrdiff_t>(EdgeModel::kMaxTests));
 }
 
 ExpectedTests BestFirstProposer::TestsAfter(const Proposal& /*proposal*/,

@@ -33,20 +33,25 @@ class BestFirstProposer : public PairProposer {
   ExpectedTests TestsAfter(const Proposal& proposal, const MatchingGraph& graph) const override;
 
  private:
-  // The next batch, once there are tests to learn from.
-  std::vector<Candidate> Likeliest(const MatchingGraph& graph);
-  // Keeps what the model looks at.
-  void ForgetOldTests();
+  // Those as likely as asked for, and the pairs of lonely images: the likeliest num of them,
+  // ascending.
+  std::vector<VertexPair> Likeliest(std::size_t num, std::size_t num_nearest,
+                                    double min_probability, const MatchingGraph& graph);
+  void Learn(const std::vector<LabelledCues>& tests);
+  // Brings the evidence up to date with the graph.
+  void TakeNote(const MatchingGraph& graph);
 
   const BestFirstOptions options_;
   const Ranking& ranking_;
+  ThreadPool& threads_;
   PairEvidence evidence_;
   SharedTracks tracks_;
   EdgeModel model_;
-  std::vector<Candidate> proposed_;        // Ascending: the last proposal,
-  std::vector<bool> are_edges_;            // and what became of it.
-  std::vector<TestedVertexPair> joining_;  // Known pairs, which the graph is about to get.
-  std::vector<LabelledCues> tested_;       // What was known of them when they were proposed.
+  std::vector<LabelledCues> proposed_;     // What was known of the last proposal when it was made,
+  std::vector<VertexPair> pairs_;          // ascending, and what became of it.
+  std::vector<TestedVertexPair> joining_;  // Tests that the evidence does not know yet,
+  std::vector<TestedVertexPair> known_;    // and those of them that nobody had proposed.
+  std::vector<LabelledCues> tested_;       // What the model learns from.
   ExpectedTests expected_;
   int num_batches_ = 0;
 };

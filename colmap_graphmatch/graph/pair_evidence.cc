@@ -7,8 +7,9 @@
 namespace colmap_graphmatch {
 namespace {
 
-// Enough to make up for the entries of OfVertex.
-constexpr std::size_t kVerticesPerEvidenceTask = 64;
+// Few enough to make up for what each allocates, enough for the threads of any machine.
+constexpr std::size_t kMinVerticesPerTask = 64;
+constexpr std::size_t kMaxTasks = 256;
 // The distance to this place of a list is what others are compared with.
 constexpr std::size_t kUsualPlace = 10;
 
@@ -17,147 +18,142 @@ double SuccessRate(std::size_t num_edges, std::size_t num_tested) {
   return (static_cast<double>(num_edges) + 1) / (static_cast<double>(num_tested) + 2);
 }
 
-}  // namespace
+// The place of an image in the list of another, counted from 0; behind all if it is not listed.
+std::uint32_t RankOf(Vertex listed, Vertex vertex, const Ranking& ranking) {
+  const std::vector<Vertex>& nearest = ranking.NearestOf(vertex);
+  const auto found = std::find(nearest.begin(), nearest.end(), listed);
+  return static_cast<std::uint32_t>(found != nearest.end()
+                                        ? static_cast<std::size_t>(found - nearest.begin())
+                                        : ranking.NumVertices());
+}
 
-// What is known of the pairs of one vertex with all others.
-class PairEvidence::OfVertex {
- public:
-  OfVertex(const PairEvidence& evidence, const MatchingGraph& graph, const SharedTracks& tracks)
-      : evidence_(evidence), graph_(graph), tracks_(tracks), entries_(graph.NumVertices()) {}
-
-  void Collect(Vertex a, std::size_t num_nearest, std::vector<Candidate>* candidates) {
-    WalkFrom(a);
-    const auto add = [&](Vertex c, bool is_of_lonely) {
-      candidates->push_back({MakeVertexPair(a, c), CuesWith(a, c, Test::kNone), is_of_lonely});
-    };
-    for (const Vertex c : touched_) {
-      // From the smaller of the two alone.
-      if (entries_[c].num_common > 0 && a < c && MayBeTested(a, c)) add(c, false);
-    }
-    const bool is_lonely = graph_.Degree(a) == 0 && graph_.NumTestedOf(a) < kMaxTestsOfLonely;
-    if (!evidence_.restrictions_.IsQuery(a)) return;
-    const std::vector<Vertex>& nearest = evidence_.ranking_.NearestOf(a);
-    for (std::size_t i = 0; i < nearest.size() && num_nearest > 0; ++i) {
-      if (!MayBeTested(a, nearest[i])) continue;
-      --num_nearest;
-      add(nearest[i], is_lonely);
+// Calls visit for all that were tested with the vertex in vain.
+template <typename Visit>
+void VisitFailed(Vertex vertex, const MatchingGraph& graph, const Visit& visit) {
+  auto neighbor = graph.Neighbors(vertex).begin();
+  const auto end = graph.Neighbors(vertex).end();
+  for (const Vertex tested : graph.Tested(vertex)) {
+    if (neighbor != end && *neighbor == tested) {
+      ++neighbor;
+    } else {
+      visit(tested);
     }
   }
+}
 
-  // All of one first vertex.
-  template <typename Iterator>
-  void Describe(Iterator begin, Iterator end, LabelledCues* described) {
-    WalkFrom(begin->pair.first);
-    for (; begin != end; ++begin, ++described) {
-      *described = {CuesWith(begin->pair.first, begin->pair.second,
-                             begin->is_edge ? Test::kEdge : Test::kNoEdge),
-                    begin->is_edge};
+// Images that are an edge of one of the two and were tested in vain with the other.
+std::uint32_t CountFailed(Vertex a, Vertex c, const MatchingGraph& graph) {
+  const auto is_edge = [&](Vertex vertex, Vertex other) {
+    const std::vector<Vertex>& neighbors = graph.Neighbors(vertex);
+    return std::binary_search(neighbors.begin(), neighbors.end(), other);
+  };
+  std::uint32_t num_failed = 0;
+  auto of_a = graph.Tested(a).begin();
+  auto of_c = graph.Tested(c).begin();
+  while (of_a != graph.Tested(a).end() && of_c != graph.Tested(c).end()) {
+    if (*of_a < *of_c) {
+      ++of_a;
+    } else if (*of_c < *of_a) {
+      ++of_c;
+    } else {
+      if (is_edge(a, *of_a) != is_edge(c, *of_c)) ++num_failed;
+      ++of_a;
+      ++of_c;
     }
+  }
+  return num_failed;
+}
+
+}  // namespace
+
+struct PairEvidence::Entry {
+  Vertex other = 0;
+  float distance = 0;
+  std::uint32_t least_rank = 0;  // Of one image in the list of the other.
+  std::uint32_t most_rank = 0;
+  std::uint32_t num_common = 0;   // Neighbours of both,
+  std::uint32_t num_failed = 0;   // and of one that were tested in vain with the other.
+  std::uint32_t num_shared = 0;   // Tracks, over all common neighbours,
+  std::uint32_t most_shared = 0;  // and of the one with the most.
+};
+
+// What new tests change for the pairs that one vertex owns.
+class PairEvidence::Changes {
+ public:
+  struct Change {
+    bool is_touched = false;
+    std::uint32_t num_common = 0;
+    std::uint32_t num_failed = 0;
+    std::uint32_t num_shared = 0;
+    std::uint32_t most_shared = 0;
+  };
+
+  // added: the new tests alone.
+  Changes(const PairEvidence& evidence, const MatchingGraph& added, const MatchingGraph& graph,
+          const SharedTracks& tracks)
+      : evidence_(evidence),
+        added_(added),
+        graph_(graph),
+        tracks_(tracks),
+        changes_(graph.NumVertices()) {}
+
+  const Change& To(Vertex c) const { return changes_[c]; }
+
+  // The other vertices of pairs that change, ascending.
+  const std::vector<Vertex>& WalkFrom(Vertex a) {
+    for (const Vertex vertex : touched_) changes_[vertex] = {};
+    touched_.clear();
+    // By both tests of a path a - b - c, at least one of which is new.
+    for (const Vertex b : graph_.Neighbors(a)) {
+      const MatchingGraph& of_b = IsNew(a, b) ? graph_ : added_;
+      AddCommon(a, b, of_b.Neighbors(b));
+      VisitFailed(b, of_b, [&](Vertex c) { AddFailed(a, c); });
+    }
+    VisitFailed(a, graph_, [&](Vertex b) {
+      const MatchingGraph& of_b = IsNew(a, b) ? graph_ : added_;
+      for (const Vertex c : of_b.Neighbors(b)) AddFailed(a, c);
+    });
+    std::sort(touched_.begin(), touched_.end());
+    return touched_;
   }
 
  private:
-  struct Entry {
-    bool is_touched = false;
-    std::uint32_t num_common = 0;   // Neighbours of both,
-    std::uint32_t num_failed = 0;   // and of one that were tested in vain with the other.
-    std::uint64_t num_shared = 0;   // Tracks, over all common neighbours,
-    std::uint64_t most_shared = 0;  // and of the one with the most.
-  };
-
-  // Of the pair itself, which the graph has and its cues must not know.
-  enum class Test { kNone, kNoEdge, kEdge };
-
-  bool MayBeTested(Vertex a, Vertex c) const {
-    return c != a && evidence_.restrictions_.Allows(a, c) && !graph_.IsTested(a, c);
+  bool IsNew(Vertex a, Vertex b) const {
+    return added_.NumTestedOf(a) > 0 && added_.IsTested(a, b);
   }
 
-  void Reset() {
-    for (const Vertex vertex : touched_) entries_[vertex] = {};
-    touched_.clear();
-  }
-
-  Entry& Touch(Vertex vertex) {
-    Entry& entry = entries_[vertex];
-    if (!entry.is_touched) {
-      entry.is_touched = true;
+  Change& Touch(Vertex vertex) {
+    Change& change = changes_[vertex];
+    if (!change.is_touched) {
+      change.is_touched = true;
       touched_.push_back(vertex);
     }
-    return entry;
+    return change;
   }
 
-  // Calls visit for all that were tested with the vertex in vain.
-  template <typename Visit>
-  void VisitFailed(Vertex vertex, const Visit& visit) const {
-    auto neighbor = graph_.Neighbors(vertex).begin();
-    const auto end = graph_.Neighbors(vertex).end();
-    for (const Vertex tested : graph_.Tested(vertex)) {
-      if (neighbor != end && *neighbor == tested) {
-        ++neighbor;
-      } else {
-        visit(tested);
-      }
+  void AddCommon(Vertex a, Vertex b, const std::vector<Vertex>& neighbors) {
+    if (neighbors.empty()) return;
+    const SharedTracks::Features& with_a = tracks_.Inliers(b, a);
+    for (const Vertex c : neighbors) {
+      if (c == a || !evidence_.Owns(a, c)) continue;
+      Change& change = Touch(c);
+      ++change.num_common;
+      const auto num_shared =
+          static_cast<std::uint32_t>(SharedTracks::CountShared(with_a, tracks_.Inliers(b, c)));
+      change.num_shared += num_shared;
+      change.most_shared = std::max(change.most_shared, num_shared);
     }
   }
 
-  // Fills the entries.
-  void WalkFrom(Vertex a) {
-    Reset();
-    for (const Vertex b : graph_.Neighbors(a)) {
-      for (const Vertex c : graph_.Neighbors(b)) ++Touch(c).num_common;
-      VisitFailed(b, [this](Vertex c) { ++Touch(c).num_failed; });
-      tracks_.VisitThrough(a, b, [this](Vertex c, std::size_t num_shared) {
-        Entry& entry = Touch(c);
-        entry.num_shared += num_shared;
-        entry.most_shared = std::max<std::uint64_t>(entry.most_shared, num_shared);
-      });
-    }
-    VisitFailed(a, [this](Vertex b) {
-      for (const Vertex c : graph_.Neighbors(b)) ++Touch(c).num_failed;
-    });
-  }
-
-  // Of the last vertex that was walked from, and another.
-  Cues CuesWith(Vertex a, Vertex c, Test own) const {
-    const std::size_t own_tests = own == Test::kNone ? 0 : 1;
-    const std::size_t own_edges = own == Test::kEdge ? 1 : 0;
-    const auto degree = [&](Vertex vertex) { return graph_.Degree(vertex) - own_edges; };
-    const auto rate = [&](Vertex vertex) {
-      return SuccessRate(degree(vertex), graph_.NumTestedOf(vertex) - own_tests);
-    };
-    const Entry& entry = entries_[c];
-    const std::size_t least_degree = std::min(degree(a), degree(c));
-    const std::size_t ranks[] = {evidence_.RankOf(a, c), evidence_.RankOf(c, a)};
-    const double rates[] = {rate(a), rate(c)};
-    const auto num_common = static_cast<double>(entry.num_common);
-    const auto num_failed = static_cast<double>(entry.num_failed);
-    const auto log = [](std::size_t number) { return std::log1p(static_cast<double>(number)); };
-    return {1,
-            RelativeDistance(a, c),
-            log(std::min(ranks[0], ranks[1])),
-            log(std::max(ranks[0], ranks[1])),
-            log(entry.most_shared),
-            log(entry.num_shared),
-            log(entry.num_common),
-            num_common / (static_cast<double>(least_degree) + 1),
-            num_failed / (num_failed + 2 * num_common + 1),
-            std::min(rates[0], rates[1]),
-            std::max(rates[0], rates[1])};
-  }
-
-  // 1 is usual. So it is where distances are none: scores of other programs may have any sign.
-  double RelativeDistance(Vertex a, Vertex c) const {
-    const double usual_of_a = evidence_.usual_distances_[a];
-    const double usual_of_c = evidence_.usual_distances_[c];
-    if (!(usual_of_a > 0 && usual_of_c > 0)) return 1;
-    constexpr double kMost = 3;
-    return std::clamp(evidence_.ranking_.Distance(a, c) / std::sqrt(usual_of_a * usual_of_c),
-                      -kMost, kMost);
+  void AddFailed(Vertex a, Vertex c) {
+    if (c != a && evidence_.Owns(a, c)) ++Touch(c).num_failed;
   }
 
   const PairEvidence& evidence_;
+  const MatchingGraph& added_;
   const MatchingGraph& graph_;
   const SharedTracks& tracks_;
-  std::vector<Entry> entries_;  // By the other vertex.
+  std::vector<Change> changes_;  // By the other vertex.
   std::vector<Vertex> touched_;
 };
 
@@ -166,77 +162,190 @@ PairEvidence::PairEvidence(const Ranking& ranking, const PairRestrictions& restr
     : ranking_(ranking),
       restrictions_(restrictions),
       threads_(threads),
-      places_(ranking.NumVertices()),
-      usual_distances_(ranking.NumVertices(), 1) {
-  threads_.ParallelFor(ranking.NumVertices(), [&](std::size_t i) {
+      num_tasks_(std::min((ranking.NumVertices() + kMinVerticesPerTask - 1) / kMinVerticesPerTask,
+                          kMaxTasks)),
+      usual_distances_(ranking.NumVertices(), 1),
+      entries_(ranking.NumVertices()) {
+  for (std::size_t i = 0; i < usual_distances_.size(); ++i) {
     const std::vector<Vertex>& nearest = ranking.NearestOf(static_cast<Vertex>(i));
-    places_[i].reserve(nearest.size());
-    for (const Vertex vertex : nearest) {
-      places_[i].emplace_back(vertex, static_cast<std::uint32_t>(places_[i].size()));
-    }
-    std::sort(places_[i].begin(), places_[i].end());
-    if (nearest.empty()) return;
+    if (nearest.empty()) continue;
     const Vertex usual = nearest[std::min(kUsualPlace, nearest.size()) - 1];
     usual_distances_[i] = ranking.Distance(static_cast<Vertex>(i), usual);
+  }
+}
+
+PairEvidence::~PairEvidence() = default;
+
+template <typename Body>
+void PairEvidence::ForEachTask(std::size_t size, const Body& body) const {
+  threads_.ParallelFor(num_tasks_, [&](std::size_t task) {
+    body(task, task * size / num_tasks_, (task + 1) * size / num_tasks_);
   });
 }
 
-std::size_t PairEvidence::RankOf(Vertex listed, Vertex vertex) const {
-  const auto& places = places_[vertex];
-  const auto found =
-      std::lower_bound(places.begin(), places.end(), std::make_pair(listed, std::uint32_t{0}));
-  return found != places.end() && found->first == listed ? found->second : ranking_.NumVertices();
-}
-
-std::vector<Candidate> PairEvidence::Collect(std::size_t num_nearest, const MatchingGraph& graph,
-                                             const SharedTracks& tracks) const {
-  const std::size_t num_vertices = graph.NumVertices();
-  const std::size_t num_tasks =
-      (num_vertices + kVerticesPerEvidenceTask - 1) / kVerticesPerEvidenceTask;
-  std::vector<std::vector<Candidate>> parts(num_tasks);
-  threads_.ParallelFor(num_tasks, [&](std::size_t task) {
-    OfVertex evidence(*this, graph, tracks);
-    const std::size_t end = std::min((task + 1) * kVerticesPerEvidenceTask, num_vertices);
-    for (std::size_t i = task * kVerticesPerEvidenceTask; i < end; ++i) {
-      evidence.Collect(static_cast<Vertex>(i), num_nearest, &parts[task]);
+void PairEvidence::Add(const std::vector<TestedVertexPair>& tests, const MatchingGraph& graph,
+                       const SharedTracks& tracks) {
+  MatchingGraph added(graph.NumVertices());
+  added.Add(tests);
+  ForEachTask(graph.NumVertices(), [&](std::size_t, std::size_t begin, std::size_t end) {
+    Changes changes(*this, added, graph, tracks);
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto a = static_cast<Vertex>(i);
+      if (restrictions_.IsQuery(a)) Update(a, changes.WalkFrom(a), changes, graph);
     }
   });
-  std::vector<Candidate> candidates;
-  for (const std::vector<Candidate>& part : parts) {
-    candidates.insert(candidates.end(), part.begin(), part.end());
-  }
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return std::tie(a.pair, b.is_of_lonely) < std::tie(b.pair, a.is_of_lonely);
-  });
-  candidates.erase(
-      std::unique(candidates.begin(), candidates.end(),
-                  [](const Candidate& a, const Candidate& b) { return a.pair == b.pair; }),
-      candidates.end());
-  return candidates;
 }
 
-std::vector<LabelledCues> PairEvidence::Describe(const std::vector<TestedVertexPair>& tested,
-                                                 const MatchingGraph& graph,
-                                                 const SharedTracks& tracks) const {
-  std::vector<LabelledCues> described(tested.size());
-  std::vector<std::size_t> starts;  // Of the pairs of each first vertex, and the end.
-  for (std::size_t i = 0; i < tested.size(); ++i) {
-    if (i == 0 || tested[i].pair.first != tested[i - 1].pair.first) starts.push_back(i);
+void PairEvidence::Update(Vertex a, const std::vector<Vertex>& changed, const Changes& changes,
+                          const MatchingGraph& graph) {
+  std::vector<Entry>& entries = entries_[a];
+  const std::size_t num_old = entries.size();
+  std::size_t i = 0;
+  for (const Vertex c : changed) {
+    while (i < num_old && entries[i].other < c) ++i;
+    const Changes::Change& change = changes.To(c);
+    if (i < num_old && entries[i].other == c) {
+      entries[i].num_common += change.num_common;
+      entries[i].num_failed += change.num_failed;
+      entries[i].num_shared += change.num_shared;
+      entries[i].most_shared = std::max(entries[i].most_shared, change.most_shared);
+    } else if (change.num_common > 0 && restrictions_.Allows(a, c)) {
+      // Failures before it had a neighbour in common were not counted.
+      Entry entry = MakeEntry(a, c, graph);
+      entry.num_common = change.num_common;
+      entry.num_shared = change.num_shared;
+      entry.most_shared = change.most_shared;
+      entries.push_back(entry);
+    }
   }
-  starts.push_back(tested.size());
-  const std::size_t num_tasks =
-      (starts.size() - 1 + kVerticesPerEvidenceTask - 1) / kVerticesPerEvidenceTask;
-  threads_.ParallelFor(num_tasks, [&](std::size_t task) {
-    OfVertex evidence(*this, graph, tracks);
-    const std::size_t end = std::min((task + 1) * kVerticesPerEvidenceTask, starts.size() - 1);
-    for (std::size_t i = task * kVerticesPerEvidenceTask; i < end; ++i) {
-      const auto at = [&](std::size_t place) {
-        return tested.begin() + static_cast<std::ptrdiff_t>(place);
-      };
-      evidence.Describe(at(starts[i]), at(starts[i + 1]), described.data() + starts[i]);
+  std::inplace_merge(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(num_old),
+                     entries.end(),
+                     [](const Entry& x, const Entry& y) { return x.other < y.other; });
+}
+
+PairEvidence::Entry PairEvidence::MakeEntry(Vertex a, Vertex c, const MatchingGraph& graph) const {
+  const std::uint32_t ranks[] = {RankOf(a, c, ranking_), RankOf(c, a, ranking_)};
+  Entry entry;
+  entry.other = c;
+  entry.distance = ranking_.Distance(a, c);
+  entry.least_rank = std::min(ranks[0], ranks[1]);
+  entry.most_rank = std::max(ranks[0], ranks[1]);
+  entry.num_failed = CountFailed(a, c, graph);
+  return entry;
+}
+
+const PairEvidence::Entry* PairEvidence::Find(Vertex a, Vertex c) const {
+  if (!Owns(a, c)) return Owns(c, a) ? Find(c, a) : nullptr;
+  const std::vector<Entry>& entries = entries_[a];
+  const auto found =
+      std::lower_bound(entries.begin(), entries.end(), c,
+                       [](const Entry& entry, Vertex vertex) { return entry.other < vertex; });
+  return found == entries.end() || found->other != c ? nullptr : &*found;
+}
+
+void PairEvidence::VisitCandidates(std::size_t num_nearest, const MatchingGraph& graph,
+                                   const Visit& visit) const {
+  struct Sample {
+    VertexPair pair;
+    bool is_of_lonely = false;
+  };
+  std::vector<std::vector<Sample>> samples_of_tasks(num_tasks_);
+  ForEachTask(graph.NumVertices(), [&](std::size_t task, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto a = static_cast<Vertex>(i);
+      auto tested = graph.Tested(a).begin();
+      for (const Entry& entry : entries_[a]) {
+        while (tested != graph.Tested(a).end() && *tested < entry.other) ++tested;
+        if (tested != graph.Tested(a).end() && *tested == entry.other) continue;
+        visit(task, {MakeVertexPair(a, entry.other), CuesOf(a, entry, OwnTest::kNone, graph)});
+      }
+      if (!restrictions_.IsQuery(a)) continue;
+      const bool is_lonely = graph.Degree(a) == 0 && graph.NumTestedOf(a) < kMaxTestsOfLonely;
+      std::size_t num_left = num_nearest;
+      for (const Vertex c : ranking_.NearestOf(a)) {
+        if (num_left == 0) break;
+        if (!restrictions_.Allows(a, c) || graph.IsTested(a, c)) continue;
+        --num_left;
+        if (Find(a, c) == nullptr)
+          samples_of_tasks[task].push_back({MakeVertexPair(a, c), is_lonely});
+      }
+    }
+  });
+  // Both images of a pair may have drawn it.
+  std::vector<Sample> samples;
+  for (const std::vector<Sample>& part : samples_of_tasks) {
+    samples.insert(samples.end(), part.begin(), part.end());
+  }
+  std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
+    return std::tie(a.pair, b.is_of_lonely) < std::tie(b.pair, a.is_of_lonely);
+  });
+  samples.erase(std::unique(samples.begin(), samples.end(),
+                            [](const Sample& a, const Sample& b) { return a.pair == b.pair; }),
+                samples.end());
+  ForEachTask(samples.size(), [&](std::size_t task, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      visit(task, {samples[i].pair, Of(samples[i].pair, graph), samples[i].is_of_lonely});
+    }
+  });
+}
+
+Cues PairEvidence::Of(const VertexPair& pair, const MatchingGraph& graph) const {
+  return Describe(pair, OwnTest::kNone, graph);
+}
+
+std::vector<LabelledCues> PairEvidence::WithoutThem(const std::vector<TestedVertexPair>& tested,
+                                                    const MatchingGraph& graph) const {
+  std::vector<LabelledCues> described(tested.size());
+  ForEachTask(tested.size(), [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const OwnTest own = tested[i].is_edge ? OwnTest::kEdge : OwnTest::kNoEdge;
+      described[i] = {Describe(tested[i].pair, own, graph), tested[i].is_edge};
     }
   });
   return described;
+}
+
+Cues PairEvidence::Describe(const VertexPair& pair, OwnTest own, const MatchingGraph& graph) const {
+  const auto& [a, c] = pair;
+  const Entry* found = Find(a, c);
+  const Entry entry = found != nullptr ? *found : MakeEntry(a, c, graph);
+  return CuesOf(a == entry.other ? c : a, entry, own, graph);
+}
+
+Cues PairEvidence::CuesOf(Vertex a, const Entry& entry, OwnTest own,
+                          const MatchingGraph& graph) const {
+  const Vertex c = entry.other;
+  const std::size_t own_tests = own == OwnTest::kNone ? 0 : 1;
+  const std::size_t own_edges = own == OwnTest::kEdge ? 1 : 0;
+  const auto degree = [&](Vertex vertex) { return graph.Degree(vertex) - own_edges; };
+  const auto rate = [&](Vertex vertex) {
+    return SuccessRate(degree(vertex), graph.NumTestedOf(vertex) - own_tests);
+  };
+  const std::size_t least_degree = std::min(degree(a), degree(c));
+  const double rates[] = {rate(a), rate(c)};
+  const auto num_common = static_cast<double>(entry.num_common);
+  const auto num_failed = static_cast<double>(entry.num_failed);
+  const auto log = [](std::uint32_t number) { return std::log1p(static_cast<double>(number)); };
+  return {1,
+          RelativeDistance(a, entry),
+          log(entry.least_rank),
+          log(entry.most_rank),
+          log(entry.most_shared),
+          log(entry.num_shared),
+          log(entry.num_common),
+          num_common / (static_cast<double>(least_degree) + 1),
+          num_failed / (num_failed + 2 * num_common + 1),
+          std::min(rates[0], rates[1]),
+          std::max(rates[0], rates[1])};
+}
+
+// 1 is usual. So it is where distances are none: scores of other programs may have any sign.
+double PairEvidence::RelativeDistance(Vertex a, const Entry& entry) const {
+  const double usual_of_a = usual_distances_[a];
+  const double usual_of_c = usual_distances_[entry.other];
+  if (!(usual_of_a > 0 && usual_of_c > 0)) return 1;
+  constexpr double kMost = 3;
+  return std::clamp(entry.distance / std::sqrt(usual_of_a * usual_of_c), -kMost, kMost);
 }
 
 }  // namespace colmap_graphmatch

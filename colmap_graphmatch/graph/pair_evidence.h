@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <functional>
 #include <vector>
 
 #include "colmap_graphmatch/base/thread_pool.h"
@@ -23,7 +23,9 @@ struct Candidate {
   bool is_of_lonely = false;
 };
 
-// Collects what the ranking, the graph and the inliers say about pairs that were not tested.
+// What the ranking, the graph and the inliers say about pairs. Of the pairs with a neighbour in
+// common it is kept, and brought up to date with every test: a test costs as many steps as its
+// images have tests. Memory: 32 bytes for each of these pairs.
 class PairEvidence {
  public:
   // Tests after which an image without a neighbour is left to its likelihood.
@@ -31,30 +33,60 @@ class PairEvidence {
 
   // All must outlive it.
   PairEvidence(const Ranking& ranking, const PairRestrictions& restrictions, ThreadPool& threads);
+  ~PairEvidence();
+  PairEvidence(const PairEvidence&) = delete;
+  PairEvidence& operator=(const PairEvidence&) = delete;
 
-  // The pairs that the paper's two moves could make, ascending, each once: those of images that
-  // have a neighbour in common (propagation), and of each image the num_nearest nearest untested
-  // ones (sampling).
-  std::vector<Candidate> Collect(std::size_t num_nearest, const MatchingGraph& graph,
-                                 const SharedTracks& tracks) const;
+  // Takes note of tests, each once, in any order. graph and tracks have them already, and no others
+  // that were not noted.
+  void Add(const std::vector<TestedVertexPair>& tests, const MatchingGraph& graph,
+           const SharedTracks& tracks);
 
-  // What would be known of these pairs of the graph if they alone had not been tested. tested:
-  // ascending.
-  std::vector<LabelledCues> Describe(const std::vector<TestedVertexPair>& tested,
-                                     const MatchingGraph& graph, const SharedTracks& tracks) const;
+  // Calls visit(task, candidate), for different tasks at once, for the pairs that the paper's two
+  // moves could make, each once: those of images that have a neighbour in common (propagation), and
+  // of each image the num_nearest nearest untested ones (sampling). task: less than NumTasks(); of
+  // one task always the same pairs in the same order. graph: as of the last Add.
+  using Visit = std::function<void(std::size_t task, const Candidate& candidate)>;
+  void VisitCandidates(std::size_t num_nearest, const MatchingGraph& graph,
+                       const Visit& visit) const;
+  std::size_t NumTasks() const { return num_tasks_; }
+
+  // What is known of a pair that was not tested.
+  Cues Of(const VertexPair& pair, const MatchingGraph& graph) const;
+
+  // What would be known of these pairs of the graph if they alone had not been tested.
+  std::vector<LabelledCues> WithoutThem(const std::vector<TestedVertexPair>& tested,
+                                        const MatchingGraph& graph) const;
 
  private:
-  class OfVertex;
+  struct Entry;
+  class Changes;
+  // Of the pair itself, which the graph has and its cues must not know.
+  enum class OwnTest { kNone, kNoEdge, kEdge };
 
-  // The place of an image in the list of another, counted from 0; behind all if it is not listed.
-  std::size_t RankOf(Vertex listed, Vertex vertex) const;
+  // Whether the pair is kept with a: with the query if that is one of them alone, otherwise with
+  // the smaller one. So what has no query costs nothing.
+  bool Owns(Vertex a, Vertex c) const {
+    return restrictions_.IsQuery(a) && (a < c || !restrictions_.IsQuery(c));
+  }
+  void Update(Vertex a, const std::vector<Vertex>& changed, const Changes& changes,
+              const MatchingGraph& graph);
+  const Entry* Find(Vertex a, Vertex c) const;
+  // Without neighbours in common.
+  Entry MakeEntry(Vertex a, Vertex c, const MatchingGraph& graph) const;
+  Cues Describe(const VertexPair& pair, OwnTest own, const MatchingGraph& graph) const;
+  Cues CuesOf(Vertex a, const Entry& entry, OwnTest own, const MatchingGraph& graph) const;
+  double RelativeDistance(Vertex a, const Entry& entry) const;
+  // Calls body(task, begin, end), in parallel, for the parts of size things.
+  template <typename Body>
+  void ForEachTask(std::size_t size, const Body& body) const;
 
   const Ranking& ranking_;
   const PairRestrictions& restrictions_;
   ThreadPool& threads_;
-  // By vertex: its list, ascending, with places; and the distance that is usual in it.
-  std::vector<std::vector<std::pair<Vertex, std::uint32_t>>> places_;
-  std::vector<double> usual_distances_;
+  std::size_t num_tasks_;
+  std::vector<double> usual_distances_;      // By vertex: what is usual in its list.
+  std::vector<std::vector<Entry>> entries_;  // By vertex: the pairs it owns, ascending.
 };
 
 }  // namespace colmap_graphmatch

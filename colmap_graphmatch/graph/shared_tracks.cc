@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "colmap_graphmatch/graph/common_bits.h"
+
 namespace colmap_graphmatch {
 namespace {
 
@@ -23,12 +25,7 @@ bool IsBeforeVertex(const std::pair<Vertex, std::vector<std::uint64_t>>& entry, 
 }  // namespace
 
 std::size_t SharedTracks::CountShared(const Features& a, const Features& b) {
-  const std::size_t size = std::min(a.size(), b.size());
-  std::size_t num_shared = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    num_shared += static_cast<std::size_t>(__builtin_popcountll(a[i] & b[i]));
-  }
-  return num_shared;
+  return CountCommonBits(a.data(), b.data(), std::min(a.size(), b.size()));
 }
 
 void SharedTracks::Add(const VertexPair& pair, const FeatureMatches& inliers) {
@@ -50,10 +47,11 @@ void SharedTracks::AddDirected(Vertex from, Vertex to, Features features) {
                 std::move(features));
 }
 
-const SharedTracks::Features* SharedTracks::Find(Vertex vertex, Vertex neighbor) const {
+const SharedTracks::Features& SharedTracks::Inliers(Vertex vertex, Vertex neighbor) const {
+  static const Features none;
   const auto& edges = edges_[vertex];
   const auto found = std::lower_bound(edges.begin(), edges.end(), neighbor, IsBeforeVertex);
-  return found == edges.end() || found->first != neighbor ? nullptr : &found->second;
+  return found == edges.end() || found->first != neighbor ? none : found->second;
 }
 
 }  // namespace colmap_graphmatch
