@@ -7,8 +7,9 @@
 namespace colmap_graphmatch {
 namespace {
 
-// Answers what was known before the run and takes everything else for no edge. Ends once all is
-// asked for: what would come then tells nothing more.
+// Answers what was known before the run and takes everything else for no edge: a pair that failed,
+// or one that an interruption left. Ends once all is asked for, and after a batch that is not known
+// for the most part: an earlier run did not get farther.
 class KnownOnly : public PairVerifier {
  public:
   // num_to_ask_for: those of the known pairs that end it.
@@ -23,12 +24,14 @@ class KnownOnly : public PairVerifier {
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override {
     stop_.ThrowIfRequested();
+    std::size_t num_known = 0;
     for (const ImagePair& pair : pairs) {
       const VerifiedPair* known = FindPair(known_, pair);
-      if (known != nullptr) ++num_asked_for_;
+      if (known != nullptr) ++num_known;
       on_verified(known != nullptr ? *known : VerifiedPair{pair});
     }
-    return num_asked_for_ < num_to_ask_for_;
+    num_asked_for_ += num_known;
+    return num_asked_for_ < num_to_ask_for_ && 2 * num_known >= pairs.size();
   }
 
   const FeatureMatches& Inliers(const ImagePair& pair) override { return verifier_.Inliers(pair); }
