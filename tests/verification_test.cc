@@ -166,6 +166,17 @@ TEST_F(VerifierTest, InliersAreReportedAndThoseOfKnownPairsRead) {
   EXPECT_EQ(inliers_, before);
 }
 
+TEST_F(VerifierTest, InliersOfKnownPairsThatAreDamagedAreNone) {
+  EXPECT_TRUE(Verify(AllPairs(12)));
+  const std::map<ImagePair, PairOutcome> outcomes = std::exchange(outcomes_, {});
+  sqlite::Connection(database_path_, sqlite::Access::kReadWrite, 5)
+      .Execute("UPDATE two_view_geometries SET data = x'0123' WHERE rows > 0");
+  EXPECT_TRUE(Verify(AllPairs(12)));
+  EXPECT_EQ(outcomes_, outcomes);
+  for (const auto& [pair, inliers] : inliers_) EXPECT_THAT(inliers, IsEmpty());
+  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("a blob of matches of the wrong size")));
+}
+
 TEST_F(VerifierTest, KnownPairsAreAnsweredWithoutColmap) {
   EXPECT_TRUE(Verify(AllPairs(10)));
   const std::size_t pairs_before = CountInLog("pair");

@@ -276,7 +276,15 @@ bool BatchVerifier::Verify(const std::vector<ImagePair>& pairs,
 const FeatureMatches& BatchVerifier::Inliers(const ImagePair& pair) {
   if (inliers_of_ != pair) {
     inliers_of_ = ImagePair();
-    inliers_ = database_.ReadInliers(pair);
+    try {
+      inliers_ = database_.ReadInliers(pair);
+    } catch (const DatabaseLockedError&) {
+      throw;
+    } catch (const DatabaseError& error) {
+      // They are evidence for other pairs, no more.
+      inliers_.clear();
+      if (!std::exchange(said_inliers_are_damaged_, true)) on_warning_(error.what());
+    }
     inliers_of_ = pair;
   }
   return inliers_;

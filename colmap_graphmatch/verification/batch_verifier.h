@@ -54,6 +54,7 @@ class BatchVerifier : public PairVerifier {
   const std::vector<VerifiedPair>& KnownPairs() const override { return known_; }
   bool Verify(const std::vector<ImagePair>& pairs,
               const std::function<void(const VerifiedPair&)>& on_verified) override;
+  // None where the database has no valid ones, of which it warns once.
   const FeatureMatches& Inliers(const ImagePair& pair) override;
 
  private:
@@ -82,6 +83,7 @@ class BatchVerifier : public PairVerifier {
   std::vector<VerifiedPair> known_;  // Ascending.
   ImagePair inliers_of_;             // The pair that Inliers was asked for last, or that was
   FeatureMatches inliers_;           // reported last.
+  bool said_inliers_are_damaged_ = false;
   std::unique_ptr<ExactMatcher> exact_matcher_;  // None if COLMAP matches.
   std::vector<ImagePair> unverified_;  // Ascending; their matches are in the database already.
   // Of failures since the last success, no image in two of them.
