@@ -12,13 +12,24 @@ namespace {
 
 // The nearest images of each: tested to begin with, and candidates at any time later.
 constexpr std::size_t kNumFirst = 1;
-constexpr std::size_t kNumNearest = 4;
-// Small batches choose best. A share of what was tested keeps the number of batches small, and
-// cost 1 to 3 % more tests on 569 photos.
-constexpr std::size_t kMinBatch = 100;
-constexpr std::size_t kTestsPerPairOfBatch = 20;
+constexpr std::size_t kNumNearest = 2;
+// Small batches choose best: half of these find 0.99 of the edges of 569 photos in 3 % fewer tests,
+// twice as many in 2 % more. A share of what was tested keeps the number of batches small.
+constexpr std::size_t kMinBatch = 60;
+constexpr std::size_t kTestsPerPairOfBatch = 40;
 // Tests after the first batch for each pair in it, as a guess.
 constexpr double kTestsPerFirst = 12;
+
+// From so many neighbours of both images on, and so many of them in common, an edge more hardly
+// changes a model.
+constexpr std::size_t kEnoughNeighbors = 10;
+constexpr std::size_t kEnoughInCommon = 4;
+
+bool HasEnoughWithout(const Candidate& candidate, const MatchingGraph& graph) {
+  const auto& [a, b] = candidate.pair;
+  return candidate.num_common >= kEnoughInCommon &&
+         std::min(graph.Degree(a), graph.Degree(b)) >= kEnoughNeighbors;
+}
 
 struct LikelyPair {
   double probability = 0;
@@ -70,10 +81,12 @@ std::optional<Proposal> BestFirstProposer::Next(const MatchingGraph& graph) {
 std::vector<VertexPair> BestFirstProposer::Likeliest(std::size_t num, std::size_t num_nearest,
                                                      double min_probability,
                                                      const MatchingGraph& graph) {
+  const bool is_for_model = options_.goal == BestFirstOptions::Goal::kModel;
   std::vector<std::vector<LikelyPair>> parts(evidence_.NumTasks());
   evidence_.VisitCandidates(num_nearest, graph, [&](std::size_t task, const Candidate& candidate) {
     const double probability = model_.Probability(candidate.cues);
     if (probability < min_probability && !candidate.is_of_lonely) return;
+    if (is_for_model && HasEnoughWithout(candidate, graph)) return;
     parts[task].push_back({probability, candidate.pair});
   });
   std::vector<LikelyPair> likely;

@@ -45,8 +45,10 @@ void GraphMatchOptions::Check() const {
 }
 
 std::string BestFirstOptions::Key() const {
-  const auto& [probability, pairs] = *this;  // Does not compile if a field is forgotten.
-  return "probability " + ExactText(probability) + ", " + pairs.Key();
+  // Does not compile if a field is forgotten.
+  const auto& [aim, probability, pairs] = *this;
+  return "probability " + ExactText(probability) + ", " + pairs.Key() +
+         (aim == Goal::kEdges ? "" : ", goal " + std::to_string(static_cast<int>(aim)));
 }
 
 void BestFirstOptions::Check() const {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "colmap_graphmatch/base/enum_words.h"
 #include "colmap_graphmatch/graph/pair_restrictions.h"
 
 namespace colmap_graphmatch {
@@ -52,6 +53,11 @@ struct GraphMatchOptions {
 
 // Of the strategy that tests the likeliest pairs next (graph/best_first.h).
 struct BestFirstOptions {
+  // kEdges: finds all edges. kModel: tests no pair that a model hardly gains by: of two images that
+  // have neighbours enough, and enough of them in common. (State files have the numbers.)
+  enum class Goal { kEdges, kModel };
+  Goal goal = Goal::kEdges;
+
   // Ends when no pair is as likely to be an edge. Greater than 0 and less than 1.
   double min_edge_probability = 0.01;
   PairRestrictions restrictions;
@@ -62,5 +68,8 @@ struct BestFirstOptions {
   // Throws OptionsError.
   void Check() const;
 };
+
+inline constexpr EnumWords<BestFirstOptions::Goal, 2> kGoalWords = {
+    {{BestFirstOptions::Goal::kEdges, "edges"}, {BestFirstOptions::Goal::kModel, "model"}}};
 
 }  // namespace colmap_graphmatch

@@ -257,7 +257,8 @@ void PairEvidence::VisitCandidates(std::size_t num_nearest, const MatchingGraph&
       for (const Entry& entry : entries_[a]) {
         while (tested != graph.Tested(a).end() && *tested < entry.other) ++tested;
         if (tested != graph.Tested(a).end() && *tested == entry.other) continue;
-        visit(task, {MakeVertexPair(a, entry.other), CuesOf(a, entry, OwnTest::kNone, graph)});
+        visit(task, {MakeVertexPair(a, entry.other), CuesOf(a, entry, OwnTest::kNone, graph),
+                     entry.num_common});
       }
       if (!restrictions_.IsQuery(a)) continue;
       const bool is_lonely = graph.Degree(a) == 0 && graph.NumTestedOf(a) < kMaxTestsOfLonely;
@@ -284,7 +285,7 @@ void PairEvidence::VisitCandidates(std::size_t num_nearest, const MatchingGraph&
                 samples.end());
   ForEachTask(samples.size(), [&](std::size_t task, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      visit(task, {samples[i].pair, Of(samples[i].pair, graph), samples[i].is_of_lonely});
+      visit(task, {samples[i].pair, Of(samples[i].pair, graph), 0, samples[i].is_of_lonely});
     }
   });
 }

@@ -18,6 +18,7 @@ namespace colmap_graphmatch {
 struct Candidate {
   VertexPair pair;
   Cues cues = {};
+  std::size_t num_common = 0;  // Neighbours in common.
   // One of its images has no neighbour yet and was tested with few: it draws on, however unlikely
   // the pair is.
   bool is_of_lonely = false;
@@ -29,7 +30,7 @@ struct Candidate {
 class PairEvidence {
  public:
   // Tests after which an image without a neighbour is left to its likelihood.
-  static constexpr std::size_t kMaxTestsOfLonely = 40;
+  static constexpr std::size_t kMaxTestsOfLonely = 30;
 
   // All must outlive it.
   PairEvidence(const Ranking& ranking, const PairRestrictions& restrictions, ThreadPool& threads);
