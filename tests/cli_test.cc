@@ -166,7 +166,13 @@ TEST(Options, OfTheVocabularyTreeThatHaveAMeaningHere) {
                                   "--VocabTreeMatching.match_list_path", "images.txt"});
   EXPECT_EQ(line.pipeline.graph.max_num_neighbors, 50);
   EXPECT_EQ(line.pipeline.image_list_path, "images.txt");
-  EXPECT_THAT(line.unused_options, IsEmpty());
+  EXPECT_THAT(line.unused_options,
+              ElementsAre("--VocabTreeMatching.num_images has no effect here: it is for "
+                          "--GraphMatching.strategy graphmatch."));
+  EXPECT_THAT(
+      Parse({"--VocabTreeMatching.num_images", "50", "--GraphMatching.strategy", "graphmatch"})
+          .unused_options,
+      IsEmpty());
   EXPECT_THAT(
       ErrorOf({"--VocabTreeMatching.match_list_path", "a", "--GraphMatching.match_list_path", "b"}),
       HasSubstr("give one of them"));
@@ -199,6 +205,28 @@ TEST(Options, WithoutMeaningAreSaidOnce) {
       line.unused_options,
       ElementsAre(HasSubstr("--VocabTreeMatching.vocab_tree_path has no effect here: there is"),
                   HasSubstr("num_checks")));
+}
+
+TEST(Options, OfOtherStrategiesAndDescriptorsAreSaidToHaveNoEffect) {
+  const auto unused = [](const std::string& option, const std::string& strategy,
+                         const std::string& descriptor) {
+    return Parse({option, "1", "--GraphMatching.strategy", strategy, "--GraphMatching.descriptor",
+                  descriptor})
+        .unused_options;
+  };
+  const std::string num_components = "--GraphMatching.num_components";
+  EXPECT_THAT(unused(num_components, "graphmatch", "fisher"), IsEmpty());
+  EXPECT_THAT(unused(num_components, "graphmatch", "asmk"), ElementsAre(HasSubstr("descriptor")));
+  const std::string num_expansions = "--GraphMatching.num_expansions";
+  EXPECT_THAT(unused(num_expansions, "briad", "asmk"), IsEmpty());
+  EXPECT_THAT(unused(num_expansions, "retrieval", "asmk"), ElementsAre(HasSubstr("briad")));
+  const std::string num_to_propagate = "--GraphMatching.num_to_propagate";
+  EXPECT_THAT(unused(num_to_propagate, "propagation", "asmk"), IsEmpty());
+  EXPECT_THAT(unused(num_to_propagate, "best_first", "asmk"), ElementsAre(HasSubstr("graphmatch")));
+  EXPECT_THAT(Parse({"--GraphMatching.goal", "model"}).unused_options, IsEmpty());
+  EXPECT_THAT(Parse({"--GraphMatching.goal", "model", "--GraphMatching.strategy", "exhaustive"})
+                  .unused_options,
+              ElementsAre(HasSubstr("best_first")));
 }
 
 TEST(Options, SeedsReachColmapToo) {
@@ -486,7 +514,7 @@ TEST(Summary, OfARunThatABudgetEnded) {
             "Matching graph     0 edges, 1 components, the largest of 3 images\n"
             "Without an edge    2 images\n"
             "Stopped            after max_pairs = 4; about 2 more tests were to come\n"
-            "Time               96.5 s (mixture 1.0 s, Fisher vectors 2.0 s, ranking 3.0 s, "
+            "Time               96.5 s (vocabulary 1.0 s, visual words 2.0 s, ranking 3.0 s, "
             "matching 90.0 s)\n");
 }
 
@@ -533,6 +561,9 @@ TEST_F(ProjectTest, DefaultsWithoutMeaningAreNotMentioned) {
               IsEmpty());
   EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_checks=65\n")).unused_options,
               ElementsAre(HasSubstr("num_checks")));
+  EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_images=100\n")).unused_options, IsEmpty());
+  EXPECT_THAT(Parse(Project("[VocabTreeMatching]\nnum_images=50\n")).unused_options,
+              ElementsAre(HasSubstr("--VocabTreeMatching.num_images has no effect here")));
 }
 
 TEST_F(ProjectTest, UnknownNamesInGroupsOfMatchingAreMentioned) {

@@ -16,6 +16,8 @@
 namespace colmap_graphmatch {
 namespace {
 
+using Descriptor = ImageVectorOptions::Descriptor;
+using Strategy = PipelineOptions::Strategy;
 using Use = OptionRow::Use;
 
 constexpr std::array<const char*, 3> kMatchingGroups = {"SiftMatching.", "TwoViewGeometry.",
@@ -32,6 +34,7 @@ class Table {
   std::vector<OptionRow> Make() {
     AddGeneral();
     AddGraph();
+    AddOtherStrategies();
     AddVectors();
     AddMatching();
     AddWork();
@@ -58,6 +61,15 @@ class Table {
     row.names = {name};
     rows_.push_back(std::move(row));
     return rows_.back();
+  }
+
+  // Without effect in runs for which has_effect is false.
+  OptionRow& AddFor(const std::string& belongs_to, std::function<bool()> has_effect,
+                    const std::string& name, Value value, const std::string& help) {
+    OptionRow& row = Add(name, std::move(value), help);
+    row.belongs_to = belongs_to;
+    row.has_effect = std::move(has_effect);
+    return row;
   }
 
   OptionRow& AddColmap(Use use, std::vector<ColmapSpelling> colmap, Value value,
@@ -124,6 +136,7 @@ class Table {
 
   void AddGeneral();
   void AddGraph();
+  void AddOtherStrategies();
   void AddVectors();
   void AddMatching();
   void AddWork();
@@ -165,8 +178,8 @@ void Table::AddGraph() {
   PipelineOptions& p = line_->pipeline;
   Section("GraphMatch: which pairs are tested");
   Add("GraphMatching.strategy", OneOf(&p.strategy, kStrategyWords),
-      "which pairs are tested: those that graphmatch finds, or best_first: the likeliest; for "
-      "comparison sampling or propagation (after one sampling) alone, retrieval: the nearest "
+      "which pairs are tested: best_first: the likeliest; graphmatch: those of the paper's loop; "
+      "for comparison sampling or propagation (after one sampling) alone, retrieval: the nearest "
       "images of each, briad: retrieval and query expansion; exhaustive: all")
       .is_common = true;
   Add("GraphMatching.match_list_path", TextOf(&p.match_list_path, "the path of a list of pairs"),
@@ -176,26 +189,16 @@ void Table::AddGraph() {
             // COLMAP's default is an empty one.
             TextOrNothingOf(&p.image_list_path, "the path of a list of images"),
             "a file of image names, one a line: only these look for partners, among all images");
-  Add("GraphMatching.number_sample_iterations", IntOf(&p.graph.number_sample_iterations, 0),
-      "iterations (>= 0) that sample before propagating; later ones only propagate");
-  Add("GraphMatching.max_tests_for_sampling", IntOf(&p.graph.max_tests_for_sampling, 0),
-      "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N "
-      "images. More finds weaker links and costs up to N tests for each")
+  const char kBestFirst[] = "--GraphMatching.strategy best_first";
+  const auto is_best_first = [&p] { return p.RanksImages() && p.strategy == Strategy::kBestFirst; };
+  AddFor(kBestFirst, is_best_first, "GraphMatching.goal", OneOf(&p.best_first.goal, kGoalWords),
+         "edges: all of them; model: only those that a model gains by, which saves tests in dense "
+         "scenes");
+  AddFor(kBestFirst, is_best_first, "GraphMatching.min_edge_probability",
+         DoubleOf(&p.best_first.min_edge_probability, Zero::kNotAllowed),
+         "the run ends when no pair is as likely (> 0, < 1) to be an edge. Less finds weaker links "
+         "and costs more tests")
       .is_common = true;
-  OptionRow& neighbors =
-      Add("GraphMatching.max_num_neighbors", IntOf(&p.graph.max_num_neighbors, 1),
-          "neighbours (>= 1) after which an image looks for no more itself. Fewer thins dense "
-          "scenes. VocabTreeMatching.num_images is another name for it, which to COLMAP means the "
-          "images that are tested with each (100)");
-  neighbors.use = Use::kHere;
-  neighbors.colmap = {{{3, 8}, "VocabTreeMatching.num_images", "100"}};
-  AddName("VocabTreeMatching.num_images", &neighbors);
-  Add("GraphMatching.num_to_propagate", IntOf(&p.graph.num_to_propagate, 0),
-      "images (>= 0) that each neighbour hands on to an image in an iteration");
-  Add("GraphMatching.min_edge_probability",
-      DoubleOf(&p.best_first.min_edge_probability, Zero::kNotAllowed),
-      "best_first ends when it thinks no pair as probable (> 0, < 1) to be an edge. Less finds "
-      "weaker links and costs more tests");
   Add("GraphMatching.max_pairs", CountOf(&p.budget.max_pairs),
       "pairs (>= 0) that the run may test, the most promising of each batch first; a later run "
       "goes on; 0: no limit");
@@ -207,40 +210,89 @@ void Table::AddGraph() {
       "only rank the images: the first candidates are counted, and written by export_pairs; "
       "nothing "
       "is verified, nothing written to the database, and COLMAP is not run");
-  Add("GraphMatching.num_retrieved_images", IntOf(&p.num_retrieved_images, 0),
+}
+
+void Table::AddOtherStrategies() {
+  PipelineOptions& p = line_->pipeline;
+  Section("GraphMatch: the strategies graphmatch, retrieval and briad");
+  const char kLoop[] = "--GraphMatching.strategy graphmatch";
+  const auto is_loop = [&p] {
+    return p.RanksImages() &&
+           (p.strategy == Strategy::kGraphMatch || p.strategy == Strategy::kSampling ||
+            p.strategy == Strategy::kPropagation);
+  };
+  AddFor(kLoop, is_loop, "GraphMatching.number_sample_iterations",
+         IntOf(&p.graph.number_sample_iterations, 0),
+         "iterations (>= 0) that sample before propagating; later ones only propagate");
+  AddFor(kLoop, is_loop, "GraphMatching.max_tests_for_sampling",
+         IntOf(&p.graph.max_tests_for_sampling, 0),
+         "tests (>= 0) that sampling may spend on an image; 0: max(min(0.017 N, 120), 10) of N "
+         "images. More finds weaker links and costs up to N tests for each");
+  OptionRow& neighbors = AddFor(
+      kLoop, is_loop, "GraphMatching.max_num_neighbors", IntOf(&p.graph.max_num_neighbors, 1),
+      "neighbours (>= 1) after which an image looks for no more itself. Fewer thins dense "
+      "scenes. VocabTreeMatching.num_images is another name for it, which to COLMAP means "
+      "the images that are tested with each (100)");
+  neighbors.use = Use::kHere;
+  neighbors.colmap = {{{3, 8}, "VocabTreeMatching.num_images", "100"}};
+  AddName("VocabTreeMatching.num_images", &neighbors);
+  AddFor(kLoop, is_loop, "GraphMatching.num_to_propagate", IntOf(&p.graph.num_to_propagate, 0),
+         "images (>= 0) that each neighbour hands on to an image in an iteration");
+  AddFor(kLoop, is_loop, "GraphMatching.max_failed_samples", IntOf(&p.graph.max_failed_samples, 0),
+         "draws (>= 0) of an image in a row that were no edges, after which it draws no more if "
+         "it has a neighbour; 0: it spends its whole budget. 3 saves tests and loses few edges");
+  AddFor(
+      "--GraphMatching.strategy retrieval and briad",
+      [&p] {
+        return p.RanksImages() &&
+               (p.strategy == Strategy::kRetrieval || p.strategy == Strategy::kBriad);
+      },
+      "GraphMatching.num_retrieved_images", IntOf(&p.num_retrieved_images, 0),
       "images (>= 1) that retrieval and briad test each image with; 0: 120, and 40 for briad");
-  Add("GraphMatching.num_expansions", IntOf(&p.num_expansions, 0),
+  AddFor(
+      "--GraphMatching.strategy briad",
+      [&p] { return p.RanksImages() && p.strategy == Strategy::kBriad; },
+      "GraphMatching.num_expansions", IntOf(&p.num_expansions, 0),
       "rounds (>= 0) of query expansion by briad");
-  Add("GraphMatching.max_failed_samples", IntOf(&p.graph.max_failed_samples, 0),
-      "draws (>= 0) of an image in a row that were no edges, after which it draws no more if it "
-      "has a neighbour; 0: it spends its whole budget. 3 saves tests and loses few edges");
 }
 
 void Table::AddVectors() {
+  const PipelineOptions& p = line_->pipeline;
   ImageRankingOptions& ranking = line_->pipeline.ranking;
   ImageVectorOptions& vectors = ranking.vectors;
   Section("GraphMatch: how images are described");
   Add("GraphMatching.descriptor", OneOf(&vectors.descriptor, kDescriptorWords),
-      "what describes an image: Fisher vectors of its features, or visual words of all of them "
-      "(asmk: better lists, more time); for comparison VLAD, GIST of the photo, or vectors of "
-      "another program from a file");
+      "what describes an image: asmk: the visual words of its features; fisher: Fisher vectors of "
+      "them; for comparison VLAD, GIST of the photo, or vectors of another program from a file");
   Add("image_path",
       TextOf(&vectors.image_path, "the path of a directory", OptionRow::Path::kDirectory),
       "the directory of the photos: to show them in the report, and for the descriptor gist")
       .is_common = true;
-  Add("GraphMatching.vectors_path", TextOf(&vectors.vectors_path, "the path of a .npy file"),
+  AddFor(
+      "--GraphMatching.descriptor file",
+      [&vectors] { return vectors.descriptor == Descriptor::kFile; }, "GraphMatching.vectors_path",
+      TextOf(&vectors.vectors_path, "the path of a .npy file"),
       "for the descriptor file: a NumPy array, a row of float32 or float64 for each image; the "
       "images' names are in the file of the same name with .txt instead of .npy, one a line");
   Add("GraphMatching.export_vectors", TextOf(&ranking.export_path, "the path of a .npy file"),
       "write the vectors that were made to such files");
-  Add("GraphMatching.pca_dim", IntOf(&vectors.pca_dim, 0),
+  const char kMixtures[] = "--GraphMatching.descriptor fisher and vlad";
+  const auto has_mixture = [&p, &ranking, &vectors] {
+    return p.RanksImages() && ranking.ranking_path.empty() &&
+           (vectors.descriptor == Descriptor::kFisher || vectors.descriptor == Descriptor::kVlad);
+  };
+  AddFor(
+      kMixtures, has_mixture, "GraphMatching.pca_dim", IntOf(&vectors.pca_dim, 0),
       "dimensions (1 to 128) that the features are reduced to before the mixture; 0: not reduced");
-  Add("GraphMatching.num_components", IntOf(&vectors.gmm.num_components, 1),
-      "Gaussians (>= 1) of the mixture; time and memory grow in proportion");
-  Add("GraphMatching.max_num_features", IntOf(&vectors.max_num_features, 1),
-      "features (>= 1) of an image that are encoded at most, those of the largest scales");
-  Add("GraphMatching.num_training_descriptors", IntOf(&vectors.num_training_descriptors, 1),
-      "descriptors (>= 1) that the mixture is learnt from");
+  AddFor(kMixtures, has_mixture, "GraphMatching.num_components",
+         IntOf(&vectors.gmm.num_components, 1),
+         "Gaussians (>= 1) of the mixture; time and memory grow in proportion");
+  AddFor(kMixtures, has_mixture, "GraphMatching.max_num_features",
+         IntOf(&vectors.max_num_features, 1),
+         "features (>= 1) of an image that are encoded at most, those of the largest scales");
+  AddFor(kMixtures, has_mixture, "GraphMatching.num_training_descriptors",
+         IntOf(&vectors.num_training_descriptors, 1),
+         "descriptors (>= 1) that the mixture is learnt from");
   Add("GraphMatching.ranking_path", TextOf(&ranking.ranking_path, "the path of ranked lists"),
       "a file of ranked images instead, e.g. of a vocabulary tree: image, other image and score a "
       "line, separated by tabs; greater scores are nearer");

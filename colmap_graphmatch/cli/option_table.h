@@ -55,6 +55,11 @@ struct OptionRow {
   // FeatureMatching, between which COLMAP moved them.
   std::vector<std::string> names;
 
+  // What alone it is for, as it is given ("--GraphMatching.strategy briad"), and whether this run is
+  // that; empty and null if it is for all.
+  std::string belongs_to;
+  std::function<bool()> has_effect;
+
   // Stores the value. False if it is not one of `values`.
   std::function<bool(const std::string& text)> read;
 

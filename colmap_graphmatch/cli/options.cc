@@ -134,6 +134,7 @@ class Parser {
     }
     CheckFiles();
     p.Check();
+    SayWhatHasNoEffect();
     if (line_->dry_run && (!p.RanksImages() || !p.replay_path.empty())) {
       throw OptionsError(
           "--GraphMatching.dry_run shows which pairs a strategy that ranks images would test "
@@ -196,6 +197,7 @@ class Parser {
     for (const Given& option : given) {
       const OptionRow& row = *by_name_.at(option.name);
       const bool is_first = on_command_line_.insert(&row).second;
+      asked_for_.emplace(&row, option.name);
       if (row.use == OptionRow::Use::kUnused && is_first) SayUnused(option.name, row);
     }
     Store(given, "");
@@ -240,6 +242,7 @@ class Parser {
         SayUnused(option.string_key, *row->second);
       }
       given.push_back({option.string_key, value});
+      if (!IsDefault(*row->second, value)) asked_for_.emplace(row->second, option.string_key);
     }
     Store(given, " in " + path);
   }
@@ -266,6 +269,16 @@ class Parser {
     return std::any_of(row.colmap.begin(), row.colmap.end(), [&](const ColmapSpelling& spelling) {
       return SameValue(spelling.default_value, value);
     });
+  }
+
+  void SayWhatHasNoEffect() {
+    for (const OptionRow& row : rows_) {
+      if (row.has_effect == nullptr || row.has_effect()) continue;
+      const auto given = asked_for_.find(&row);
+      if (given == asked_for_.end()) continue;
+      line_->unused_options.push_back("--" + given->second + " has no effect here: it is for " +
+                                      row.belongs_to + ".");
+    }
   }
 
   void SayUnused(const std::string& name, const OptionRow& row) {
@@ -300,6 +313,7 @@ class Parser {
   std::map<std::string, const OptionRow*> by_name_;
   po::options_description accepted_;
   std::set<const OptionRow*> on_command_line_;
+  std::map<const OptionRow*, std::string> asked_for_;  // Anywhere, under this name.
 };
 
 }  // namespace
