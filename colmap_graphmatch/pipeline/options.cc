@@ -27,7 +27,7 @@ bool PipelineOptions::RanksImages() const {
 }
 
 void PipelineOptions::Check() const {
-  if (!match_list_path.empty() && strategy != Strategy::kGraphMatch) {
+  if (!match_list_path.empty() && strategy != PipelineOptions().strategy) {
     throw OptionsError(
         "--GraphMatching.match_list_path and --GraphMatching.strategy contradict each other: give "
         "one of them.");

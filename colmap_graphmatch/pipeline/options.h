@@ -26,11 +26,10 @@ struct TestBudget {
 struct PipelineOptions {
   std::filesystem::path database_path;
 
-  // Which pairs are tested. kGraphMatch: those that the loop finds. kSampling: the loop without
-  // propagation. kPropagation: the loop with its first sampling alone. kRetrieval: the nearest
-  // images of each. kBriad: the same and then num_expansions rounds of query expansion. kBestFirst:
-  // the likeliest ones first, as the tests before them say.
-  // kExhaustive: all.
+  // Which pairs are tested. kBestFirst: the likeliest ones next, as the tests before them say.
+  // kGraphMatch: those that the paper's loop finds. kSampling: the loop without propagation.
+  // kPropagation: the loop with its first sampling alone. kRetrieval: the nearest images of each.
+  // kBriad: the same and then num_expansions rounds of query expansion. kExhaustive: all.
   // (pipeline/strategy.h says what makes a new one.)
   enum class Strategy {
     kGraphMatch,
@@ -41,7 +40,7 @@ struct PipelineOptions {
     kBestFirst,
     kExhaustive
   };
-  Strategy strategy = Strategy::kGraphMatch;
+  Strategy strategy = Strategy::kBestFirst;
 
   // Tests the pairs of this list (docs/formats.md) instead, unless it is empty.
   std::filesystem::path match_list_path;
@@ -103,12 +102,12 @@ struct PipelineOptions {
 };
 
 inline constexpr EnumWords<PipelineOptions::Strategy, 7> kStrategyWords = {
-    {{PipelineOptions::Strategy::kGraphMatch, "graphmatch"},
+    {{PipelineOptions::Strategy::kBestFirst, "best_first"},
+     {PipelineOptions::Strategy::kGraphMatch, "graphmatch"},
      {PipelineOptions::Strategy::kSampling, "sampling"},
      {PipelineOptions::Strategy::kPropagation, "propagation"},
      {PipelineOptions::Strategy::kRetrieval, "retrieval"},
      {PipelineOptions::Strategy::kBriad, "briad"},
-     {PipelineOptions::Strategy::kBestFirst, "best_first"},
      {PipelineOptions::Strategy::kExhaustive, "exhaustive"}}};
 
 }  // namespace colmap_graphmatch

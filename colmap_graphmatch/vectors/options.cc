@@ -68,7 +68,7 @@ void ImageRankingOptions::Check() const {
     throw OptionsError("--GraphMatching.export_vectors is " + export_path.string() +
                        "; its name must end in .npy (the names go beside it, into .txt).");
   }
-  if (!ranking_path.empty() && vectors.descriptor != ImageVectorOptions::Descriptor::kFisher) {
+  if (!ranking_path.empty() && vectors.descriptor != ImageVectorOptions().descriptor) {
     throw OptionsError(
         "--GraphMatching.ranking_path and --GraphMatching.descriptor contradict each other: give "
         "one of them.");
@@ -76,7 +76,7 @@ void ImageRankingOptions::Check() const {
   if (!export_path.empty() && vectors.descriptor == ImageVectorOptions::Descriptor::kAsmk) {
     throw OptionsError(
         "--GraphMatching.export_vectors writes a row of numbers for each image, and "
-        "--GraphMatching.descriptor asmk describes images by visual words: leave one of them out.");
+        "visual words are none: add --GraphMatching.descriptor fisher.");
   }
   if (!export_path.empty() && (given || !ranking_path.empty())) {
     throw OptionsError(

@@ -10,11 +10,12 @@
 namespace colmap_graphmatch {
 
 struct ImageVectorOptions {
-  // kFisher: Fisher vectors of SIFT features. kAsmk: visual words of all features, compared by an
-  // aggregated selective match kernel. For comparison kVlad: VLAD under the same mixture, kGist:
-  // GIST of the photos, kFile: vectors that another program made. (State files have the numbers.)
+  // kAsmk: visual words of all features, compared by an aggregated selective match kernel. kFisher:
+  // Fisher vectors of the features of largest scale, as in the paper. For comparison kVlad: VLAD
+  // under the same mixture, kGist: GIST of the photos, kFile: vectors that another program made.
+  // (State files have the numbers.)
   enum class Descriptor { kFisher, kVlad, kGist, kFile, kAsmk };
-  Descriptor descriptor = Descriptor::kFisher;
+  Descriptor descriptor = Descriptor::kAsmk;
 
   // Where the photos are, for kGist.
   std::filesystem::path image_path;
@@ -48,8 +49,8 @@ struct ImageVectorOptions {
 };
 
 inline constexpr EnumWords<ImageVectorOptions::Descriptor, 5> kDescriptorWords = {
-    {{ImageVectorOptions::Descriptor::kFisher, "fisher"},
-     {ImageVectorOptions::Descriptor::kAsmk, "asmk"},
+    {{ImageVectorOptions::Descriptor::kAsmk, "asmk"},
+     {ImageVectorOptions::Descriptor::kFisher, "fisher"},
      {ImageVectorOptions::Descriptor::kVlad, "vlad"},
      {ImageVectorOptions::Descriptor::kGist, "gist"},
      {ImageVectorOptions::Descriptor::kFile, "file"}}};

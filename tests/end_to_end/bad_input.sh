@@ -705,7 +705,7 @@ says 5 'A file to write is another database' "${run[@]}" \
 rm "$place/other.db"
 echo 'my own names' >"$place/vectors.txt"
 says 5 'What is written beside a file would take the place of one of yours' "${run[@]}" \
-  --GraphMatching.export_vectors "$place/vectors.npy"
+  --GraphMatching.descriptor fisher --GraphMatching.export_vectors "$place/vectors.npy"
 rm "$place/vectors.txt"
 says 1 'A file to write belongs to the database' "${run[@]}" \
   --GraphMatching.export_pairs "$database-wal"

@@ -105,7 +105,7 @@ tested_pairs "$database" | cmp - "$work/undisturbed.txt"
 
 echo "== What a run keeps for the next one"
 grep -q 'those of 40 images are from the last run' "$work/output.txt" || fail "the vectors were computed again"
-grep -q 'is that of the last run' "$work/output.txt" || fail "the mixture was learnt again"
+grep -q 'is that of the last run' "$work/output.txt" || fail "the vocabulary was learnt again"
 # Other features of an image: its vector alone is computed again.
 cp "$database" "$work/kept.db"
 cp "$database.graphmatch" "$work/kept.db.graphmatch"
@@ -115,7 +115,7 @@ expect_exit 0 'those of 39 images are from the last run' "$matcher" --database_p
 # Its pairs are not what they were: COLMAP keeps such pairs, and so does this, but not without a word.
 grep -q 'other features than in the last run (1, the first is "place0/photo 6.jpg")' "$work/output.txt" ||
   fail "no warning that features have changed"
-expect_exit 0 'Learnt a mixture' "$matcher" --database_path "$work/kept.db" --colmap_path "$fake" --random_seed 5
+expect_exit 0 'Learnt a vocabulary' "$matcher" --database_path "$work/kept.db" --colmap_path "$fake" --random_seed 5
 # Deleted or damaged, it costs nothing but time.
 # shellcheck disable=SC2016
 for damage in 'rm "$1"' 'dd if=/dev/urandom of="$1" bs=4096 seek=1 count=3 conv=notrunc status=none' 'truncate -s 5000 "$1"' \

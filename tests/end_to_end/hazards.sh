@@ -59,6 +59,7 @@ handles() {
 }
 
 echo "== Outputs and what is beside them"
+export_vectors=(--GraphMatching.descriptor fisher --GraphMatching.export_vectors)
 fresh small
 cp database.db pairs.txt.partial
 expect_exit 0 'Pairs tested' "$matcher" --database_path pairs.txt.partial --colmap_path "$fake" \
@@ -75,19 +76,19 @@ keeps database.db 0 'Dry run' "${run[@]}" --GraphMatching.dry_run 1 --GraphMatch
 fresh small
 printf 'place0/photo 0.jpg\nplace0/photo 1.jpg\n' >images.txt
 keeps images.txt 1 'are the same file' "${run[@]}" --VocabTreeMatching.match_list_path images.txt \
-  --GraphMatching.export_vectors images.npy
+  "${export_vectors[@]}" images.npy
 cp database.db vectors.txt
 keeps vectors.txt 1 'are the same file' "$matcher" --database_path vectors.txt --colmap_path "$fake" \
-  --GraphMatching.export_vectors vectors.npy
-expect_exit 1 'are the same file' "${run[@]}" --GraphMatching.export_pairs w.txt --GraphMatching.export_vectors w.npy
-keeps images.txt 5 'It may be another file of yours' "${run[@]}" --GraphMatching.export_vectors images.npy
+  "${export_vectors[@]}" vectors.npy
+expect_exit 1 'are the same file' "${run[@]}" --GraphMatching.export_pairs w.txt "${export_vectors[@]}" w.npy
+keeps images.txt 5 'It may be another file of yours' "${run[@]}" "${export_vectors[@]}" images.npy
 # A report of its own is not another file.
 expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.report own.json
 expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.report own.html
 echo '{"mine": 1}' >run.json
 keeps run.json 5 'It may be another file of yours' "${run[@]}" --GraphMatching.report run.html
-expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_vectors v.npy --GraphMatching.report r.html
-expect_exit 0 'Pairs tested' "${run[@]}" --GraphMatching.export_vectors v.npy --GraphMatching.report r.html
+expect_exit 0 'Pairs tested' "${run[@]}" "${export_vectors[@]}" v.npy --GraphMatching.report r.html
+expect_exit 0 'Pairs tested' "${run[@]}" "${export_vectors[@]}" v.npy --GraphMatching.report r.html
 
 fresh small
 for suffix in -wal -shm -journal .graphmatch .graphmatch-journal; do
@@ -344,7 +345,7 @@ expect_exit 0 '' bash -c '"$@" >&-' bash "${run[@]}" --log_path log.txt
 ! grep -q 'Pairs tested' log.txt || fail 'the summary went into the log'
 fresh small
 bash -c '"$@" >&- 2>&- <&-' bash "${run[@]}" --log_path log.txt || fail 'all streams are closed'
-grep -q 'Learnt a mixture' log.txt || fail 'no log'
+grep -q 'Learnt a vocabulary' log.txt || fail 'no log'
 check_integrity database.db
 for mask in 777 277 077; do
   fresh small

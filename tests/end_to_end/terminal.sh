@@ -36,7 +36,7 @@ for columns in 60 200; do
   FAKE_COLMAP_DELAY_MS=2 on_terminal 0 "$columns" "wide$columns"
   frames=$work/wide$columns.frames
   num_frames=$(grep -c $'\f' "$frames")
-  for field in '^(sampling|propagation) [0-9]+ \[=*>? *\] +[0-9]+ % .* left' 'pairs tested ' 'pairs/s ' ' edges' \
+  for field in '^(sampling|likeliest) [0-9]+ \[=*>? *\] +[0-9]+ % .* left' 'pairs tested ' 'pairs/s ' ' edges' \
     'efficiency [0-9.-]+ now, [0-9.-]+ overall' ' components' 'largest [0-9]+ images' 'images alone'; do
     expect_count "$num_frames" "$field" "$frames"
   done
@@ -49,7 +49,7 @@ echo "== A terminal that is too narrow for a field"
 for columns in 30 46; do
   FAKE_COLMAP_DELAY_MS=2 on_terminal 0 "$columns" "narrow$columns"
   # The lines of the log are wrapped, somewhere, since numbers of processes differ in length; none is overwritten.
-  tr -d ' \n' <"$work/narrow$columns.final" | grep -q 'Learntamixtureof.*Described40imagesby' ||
+  tr -d ' \n' <"$work/narrow$columns.final" | grep -q 'Learntavocabularyof.*Described40imagesby' ||
     { cat "$work/narrow$columns.final"; fail "the block is in the log"; }
   expect_count 0 'images alone' "$work/narrow$columns.final"
 done
@@ -95,11 +95,11 @@ expect_count 0 'images alone' "$work/error.final"
 echo "== Plain lines on a dumb terminal, and where there is none"
 TERM=dumb on_terminal 0 500 dumb --log_level 3
 if grep -q "$escape" "$work/dumb.raw"; then fail "orders to a dumb terminal"; fi
-expect_count 1 'propagation 1 ended: [0-9]+ pairs tested, [0-9]+ edges' "$work/dumb.final"
+expect_count 1 'sampling 1 ended: [0-9]+ pairs tested, [0-9]+ edges' "$work/dumb.final"
 cp "$work/untouched.db" "$work/plain.db"
 "$matcher" --database_path "$work/plain.db" --colmap_path "$fake" --log_level 3 >"$work/plain.stdout" 2>"$work/plain.txt"
 grep -v -E "$log_line" "$work/plain.txt" && fail "a line that is none of the log"
-expect_count 1 'propagation 1 ended: [0-9]+ pairs tested, [0-9]+ edges' "$work/plain.txt"
+expect_count 1 'sampling 1 ended: [0-9]+ pairs tested, [0-9]+ edges' "$work/plain.txt"
 
 echo "== Severities, and quiet"
 cp "$work/untouched.db" "$work/severe.db"
@@ -127,7 +127,7 @@ for target in stderr_and_file file; do
     cmp "$work/logged.txt" "$work/logs/graphmatch_matcher.log" || fail "the file has another log"
   fi
 done
-expect_count 2 'Learnt a mixture' "$work/logs/graphmatch_matcher.log"
+expect_count 2 'Learnt a vocabulary' "$work/logs/graphmatch_matcher.log"
 expect_exit 2 'There is no database' "$matcher" --database_path "$work/none.db" --log_target file \
   --log_path "$work/logs/errors.log"
 expect_count 1 '^E.*There is no database' "$work/logs/errors.log"
