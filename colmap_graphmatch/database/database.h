@@ -27,6 +27,12 @@ struct TestedPair {
   int config = 0;
 };
 
+// The matches of a pair are not as COLMAP writes them.
+class DamagedMatchesError : public DatabaseError {
+ public:
+  using DatabaseError::DatabaseError;
+};
+
 // The database of a user, made by any COLMAP from 3.8 on. Opening checks that it is one. Nothing in
 // it is changed but by WritePairs. Not thread-safe: every thread opens its own.
 //
@@ -78,7 +84,7 @@ class Database {
   std::vector<VerifiedPair> ReadVerifiedPairs(std::size_t min_num_inliers);
 
   // The matches of a pair, and the inlier matches of a tested one; none if there is no such row.
-  // Throw if they cannot be.
+  // Throw DamagedMatchesError if they cannot be.
   FeatureMatches ReadMatches(const ImagePair& pair);
   FeatureMatches ReadInliers(const ImagePair& pair);
 
