@@ -15,6 +15,7 @@ namespace {
 // A batch is cut into about this many shards, so that up to as many processes have something to do.
 // Fixed: what a shard contains must not depend on the number of cores.
 constexpr std::size_t kShardsPerBatch = 64;
+constexpr std::size_t kShardsOfSmallBatch = 8;
 
 // Below this the start of COLMAP and the copy of the features would cost more than a few per cent.
 constexpr std::size_t kMinPairsPerShard = 8;
@@ -29,12 +30,13 @@ constexpr std::size_t kPairsMatchedPerVerified = 4;
 constexpr std::size_t kMaxUnrelatedFailures = 4;
 
 // Pairs that share images come into the same shard, and shards that do follow each other.
-std::vector<ShardRunner::Shard> CutIntoShards(std::vector<ImagePair> pairs,
-                                              std::size_t min_pairs_per_shard,
-                                              std::size_t max_pairs_per_shard) {
+// min_size: where a batch would otherwise keep few cores busy; usual_size: else.
+std::vector<ShardRunner::Shard> CutIntoShards(std::vector<ImagePair> pairs, std::size_t min_size,
+                                              std::size_t usual_size, std::size_t max_size) {
   SortForReuse(&pairs);
-  const std::size_t wanted = (pairs.size() + kShardsPerBatch - 1) / kShardsPerBatch;
-  const std::size_t size = std::min(std::max(wanted, min_pairs_per_shard), max_pairs_per_shard);
+  const auto part = [&pairs](std::size_t num) { return (pairs.size() + num - 1) / num; };
+  const std::size_t least = std::clamp(part(kShardsOfSmallBatch), min_size, usual_size);
+  const std::size_t size = std::min(std::max(part(kShardsPerBatch), least), max_size);
   std::vector<ShardRunner::Shard> shards;
   for (std::size_t first = 0; first < pairs.size(); first += size) {
     const auto begin = pairs.begin() + static_cast<std::ptrdiff_t>(first);
@@ -215,8 +217,9 @@ std::deque<ShardRunner::Shard> BatchVerifier::Cut(
   // gives COLMAP the same shards, and gets the same answers, as one that was never interrupted.
   std::deque<ShardRunner::Shard> shards;
   const std::size_t factor = exact_matcher_ ? kPairsMatchedPerVerified : 1;
+  const std::size_t min_size = factor * kMinPairsPerShard;
   for (ShardRunner::Shard& shard :
-       CutIntoShards(pairs, geometry_.LeastSizeOfShards() * factor * kMinPairsPerShard,
+       CutIntoShards(pairs, min_size, geometry_.UsualSizeOfShards() * min_size,
                      factor * static_cast<std::size_t>(options_.max_pairs_per_shard))) {
     const auto unknown_end = std::stable_partition(
         shard.begin(), shard.end(),
@@ -278,12 +281,13 @@ const FeatureMatches& BatchVerifier::Inliers(const ImagePair& pair) {
     inliers_of_ = ImagePair();
     try {
       inliers_ = database_.ReadInliers(pair);
-    } catch (const DatabaseLockedError&) {
-      throw;
-    } catch (const DatabaseError& error) {
+    } catch (const DamagedMatchesError& error) {
       // They are evidence for other pairs, no more.
       inliers_.clear();
-      if (!std::exchange(said_inliers_are_damaged_, true)) on_warning_(error.what());
+      if (!std::exchange(said_inliers_are_damaged_, true)) {
+        on_warning_(std::string(error.what()) +
+                    " The run goes on without them, and says nothing of others.");
+      }
     }
     inliers_of_ = pair;
   }

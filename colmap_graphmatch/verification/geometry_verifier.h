@@ -48,7 +48,7 @@ class GeometryVerifier {
 
   // How many times as many pairs as COLMAP alone it should get at least, so that they are worth a
   // start of COLMAP.
-  virtual std::size_t LeastSizeOfShards() const { return 1; }
+  virtual std::size_t UsualSizeOfShards() const { return 1; }
 
   // What a user is told who asks why it fails on everything; empty, or a sentence.
   virtual std::string AdviceOnFailure() const { return ""; }

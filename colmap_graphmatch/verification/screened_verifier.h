@@ -30,7 +30,7 @@ class ScreenedVerifier : public GeometryVerifier {
   std::string AdviceOnFailure() const override { return colmap_.AdviceOnFailure(); }
   // COLMAP has less to do for each, and is started for likely and for close pairs. (With larger
   // ones it would start less often, and in small batches many cores would have nothing to do.)
-  std::size_t LeastSizeOfShards() const override { return 2; }
+  std::size_t UsualSizeOfShards() const override { return 2; }
 
   // Of all calls of Verify so far.
   FitStatistics SoFar() const;
