@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <tuple>
 
 namespace colmap_graphmatch {
@@ -185,6 +186,7 @@ void PairEvidence::ForEachTask(std::size_t size, const Body& body) const {
 
 void PairEvidence::Add(const std::vector<TestedVertexPair>& tests, const MatchingGraph& graph,
                        const SharedTracks& tracks) {
+  if (tests.empty()) return;
   MatchingGraph added(graph.NumVertices());
   added.Add(tests);
   ForEachTask(graph.NumVertices(), [&](std::size_t, std::size_t begin, std::size_t end) {
@@ -291,26 +293,48 @@ void PairEvidence::VisitCandidates(std::size_t num_nearest, const MatchingGraph&
 }
 
 Cues PairEvidence::Of(const VertexPair& pair, const MatchingGraph& graph) const {
-  return Describe(pair, OwnTest::kNone, graph);
+  const auto [a, entry] = EntryOf(pair, graph);
+  return CuesOf(a, entry, OwnTest::kNone, graph);
 }
 
 std::vector<LabelledCues> PairEvidence::WithoutThem(const std::vector<TestedVertexPair>& tested,
-                                                    const MatchingGraph& graph) const {
+                                                    const MatchingGraph& graph,
+                                                    const SharedTracks& tracks) const {
   std::vector<LabelledCues> described(tested.size());
   ForEachTask(tested.size(), [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const OwnTest own = tested[i].is_edge ? OwnTest::kEdge : OwnTest::kNoEdge;
-      described[i] = {Describe(tested[i].pair, own, graph), tested[i].is_edge};
+      const auto& [pair, is_edge] = tested[i];
+      auto [a, entry] = EntryOf(pair, graph);
+      if (!restrictions_.Allows(pair.first, pair.second)) CountCommon(a, graph, tracks, &entry);
+      described[i] = {CuesOf(a, entry, is_edge ? OwnTest::kEdge : OwnTest::kNoEdge, graph),
+                      is_edge};
     }
   });
   return described;
 }
 
-Cues PairEvidence::Describe(const VertexPair& pair, OwnTest own, const MatchingGraph& graph) const {
+std::pair<Vertex, PairEvidence::Entry> PairEvidence::EntryOf(const VertexPair& pair,
+                                                             const MatchingGraph& graph) const {
   const auto& [a, c] = pair;
   const Entry* found = Find(a, c);
   const Entry entry = found != nullptr ? *found : MakeEntry(a, c, graph);
-  return CuesOf(a == entry.other ? c : a, entry, own, graph);
+  return {a == entry.other ? c : a, entry};
+}
+
+void PairEvidence::CountCommon(Vertex a, const MatchingGraph& graph, const SharedTracks& tracks,
+                               Entry* entry) const {
+  std::vector<Vertex> common;
+  const std::vector<Vertex>& of_a = graph.Neighbors(a);
+  const std::vector<Vertex>& of_c = graph.Neighbors(entry->other);
+  std::set_intersection(of_a.begin(), of_a.end(), of_c.begin(), of_c.end(),
+                        std::back_inserter(common));
+  entry->num_common = static_cast<std::uint32_t>(common.size());
+  for (const Vertex b : common) {
+    const auto num_shared = static_cast<std::uint32_t>(
+        SharedTracks::CountShared(tracks.Inliers(b, a), tracks.Inliers(b, entry->other)));
+    entry->num_shared += num_shared;
+    entry->most_shared = std::max(entry->most_shared, num_shared);
+  }
 }
 
 Cues PairEvidence::CuesOf(Vertex a, const Entry& entry, OwnTest own,

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/thread_pool.h"
@@ -24,9 +25,9 @@ struct Candidate {
   bool is_of_lonely = false;
 };
 
-// What the ranking, the graph and the inliers say about pairs. Of the pairs with a neighbour in
-// common it is kept, and brought up to date with every test: a test costs as many steps as its
-// images have tests. Memory: 32 bytes for each of these pairs.
+// What the ranking, the graph and the inliers say about pairs that may be tested. Of those with a
+// neighbour in common it is kept, and brought up to date with the tests. Memory: 32 bytes for each
+// of these pairs, and room to grow.
 class PairEvidence {
  public:
   // Tests after which an image without a neighbour is left to its likelihood.
@@ -55,9 +56,11 @@ class PairEvidence {
   // What is known of a pair that was not tested.
   Cues Of(const VertexPair& pair, const MatchingGraph& graph) const;
 
-  // What would be known of these pairs of the graph if they alone had not been tested.
+  // What would be known of these pairs of the graph if they alone had not been tested; also of
+  // those that may not be.
   std::vector<LabelledCues> WithoutThem(const std::vector<TestedVertexPair>& tested,
-                                        const MatchingGraph& graph) const;
+                                        const MatchingGraph& graph,
+                                        const SharedTracks& tracks) const;
 
  private:
   struct Entry;
@@ -75,7 +78,10 @@ class PairEvidence {
   const Entry* Find(Vertex a, Vertex c) const;
   // Without neighbours in common.
   Entry MakeEntry(Vertex a, Vertex c, const MatchingGraph& graph) const;
-  Cues Describe(const VertexPair& pair, OwnTest own, const MatchingGraph& graph) const;
+  void CountCommon(Vertex a, const MatchingGraph& graph, const SharedTracks& tracks,
+                   Entry* entry) const;
+  // The pair's, by the vertex that it is found with: kept, or made.
+  std::pair<Vertex, Entry> EntryOf(const VertexPair& pair, const MatchingGraph& graph) const;
   Cues CuesOf(Vertex a, const Entry& entry, OwnTest own, const MatchingGraph& graph) const;
   double RelativeDistance(Vertex a, const Entry& entry) const;
   // Calls body(task, begin, end), in parallel, for the parts of size things.

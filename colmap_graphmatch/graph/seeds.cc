@@ -31,7 +31,9 @@ class KnownOnly : public PairVerifier {
       on_verified(known != nullptr ? *known : VerifiedPair{pair});
     }
     num_asked_for_ += num_known;
-    return num_asked_for_ < num_to_ask_for_ && 2 * num_known >= pairs.size();
+    constexpr std::size_t kSmallBatch = 10;  // Where failed pairs may be many.
+    const bool is_mostly_unknown = pairs.size() > kSmallBatch && 2 * num_known < pairs.size();
+    return num_asked_for_ < num_to_ask_for_ && !is_mostly_unknown;
   }
 
   const FeatureMatches& Inliers(const ImagePair& pair) override { return verifier_.Inliers(pair); }
