@@ -226,7 +226,10 @@ TEST(Options, OfOtherStrategiesAndDescriptorsAreSaidToHaveNoEffect) {
   EXPECT_THAT(Parse({"--GraphMatching.goal", "model"}).unused_options, IsEmpty());
   EXPECT_THAT(Parse({"--GraphMatching.goal", "model", "--GraphMatching.strategy", "exhaustive"})
                   .unused_options,
-              ElementsAre(HasSubstr("best_first")));
+              ElementsAre(HasSubstr("no image is ranked")));
+  EXPECT_THAT(
+      Parse({num_components, "1", "--GraphMatching.ranking_path", "lists.tsv"}).unused_options,
+      ElementsAre(HasSubstr("images are ranked by a file")));
 }
 
 TEST(Options, SeedsReachColmapToo) {

@@ -285,6 +285,10 @@ class Mutation : public ::testing::Test {
     options.skip_image_pairs_in_same_frame = true;
     options.verification.timeout_per_pair = 2;
     if (mode % 3 == 1) options.strategy = PipelineOptions::Strategy::kExhaustive;
+    if (mode % 5 == 1) {
+      options.strategy = PipelineOptions::Strategy::kGraphMatch;
+      options.ranking.vectors.descriptor = ImageVectorOptions::Descriptor::kFisher;
+    }
     if (mode % 4 == 1) options.verification.matcher = VerificationOptions::Matcher::kColmap;
     return RunInChild([&] {
       const StopRequest stop;

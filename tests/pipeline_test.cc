@@ -185,7 +185,7 @@ TEST(Strategies, DrawTheirOwnNumberOfImages) {
   EXPECT_EQ(draws(Strategy::kRetrieval, 7), 7);
   EXPECT_EQ(draws(Strategy::kBriad, 0), 40);
   EXPECT_EQ(draws(Strategy::kBriad, 7), 7);
-  EXPECT_EQ(draws(Strategy::kBestFirst, 0), 30);
+  EXPECT_EQ(draws(Strategy::kBestFirst, 0), 10);
   EXPECT_THROW(draws(Strategy::kExhaustive, 0), std::logic_error);
 }
 

@@ -383,8 +383,8 @@ TEST_F(ReplayTest, CandidatesAreFoundWithoutATest) {
   options_.replay_path.clear();
   const CandidateList list = find();  // There is no COLMAP at options_.colmap_path.
   EXPECT_THAT(list.images, SizeIs(30));
-  EXPECT_EQ(list.num_per_image, 30U);
-  ASSERT_EQ(list.pairs.size(), 30U * 29 / 2);
+  EXPECT_EQ(list.num_per_image, 10U);
+  ASSERT_GE(list.pairs.size(), 30U * 10 / 2);
   EXPECT_TRUE(std::is_sorted(
       list.pairs.begin(), list.pairs.end(),
       [](const CandidatePair& a, const CandidatePair& b) { return a.distance < b.distance; }));

@@ -55,8 +55,8 @@ struct OptionRow {
   // FeatureMatching, between which COLMAP moved them.
   std::vector<std::string> names;
 
-  // What alone it is for, as it is given ("--GraphMatching.strategy briad"), and whether this run is
-  // that; empty and null if it is for all.
+  // What alone it is for, as it is given ("--GraphMatching.strategy briad"), and whether this run
+  // is that; empty and null if it is for all.
   std::string belongs_to;
   std::function<bool()> has_effect;
 

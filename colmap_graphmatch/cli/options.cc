@@ -276,8 +276,15 @@ class Parser {
       if (row.has_effect == nullptr || row.has_effect()) continue;
       const auto given = asked_for_.find(&row);
       if (given == asked_for_.end()) continue;
-      line_->unused_options.push_back("--" + given->second + " has no effect here: it is for " +
-                                      row.belongs_to + ".");
+      const PipelineOptions& p = line_->pipeline;
+      const bool is_of_descriptor = row.belongs_to.find(".descriptor ") != std::string::npos;
+      std::string reason = "it is for " + row.belongs_to;
+      if (!p.RanksImages())
+        reason = "no image is ranked";
+      else if (is_of_descriptor && !p.ranking.ranking_path.empty())
+        reason = "images are ranked by a file";
+      line_->unused_options.push_back("--" + given->second + " has no effect here: " + reason +
+                                      ".");
     }
   }
 

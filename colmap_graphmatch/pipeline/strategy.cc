@@ -74,7 +74,7 @@ int DrawsPerImage(const PipelineOptions& options, std::size_t num_images) {
     case Strategy::kBriad:
       return RetrievalOptionsOf(options).num_images;
     case Strategy::kBestFirst:
-      return static_cast<int>(PairEvidence::kMaxTestsOfLonely);
+      return 10;  // Most images are tested with no more of their lists.
     case Strategy::kExhaustive:
       break;
   }

@@ -29,8 +29,8 @@ GraphMatchOptions LoopOptionsOf(const PipelineOptions& options);
 // The retrieval that the options come to; with a strategy that does not retrieve, of kRetrieval.
 RetrievalOptions RetrievalOptionsOf(const PipelineOptions& options);
 
-// The images of its ranked list that a strategy that ranks images tests with each of num_images
-// images if nothing matches.
+// The images of its ranked list that a strategy that ranks images is likely to test with each of
+// num_images images, whatever matches.
 int DrawsPerImage(const PipelineOptions& options, std::size_t num_images);
 
 // What the seeds of the loop depend on, apart from the images and their vectors.

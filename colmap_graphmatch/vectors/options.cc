@@ -73,15 +73,15 @@ void ImageRankingOptions::Check() const {
         "--GraphMatching.ranking_path and --GraphMatching.descriptor contradict each other: give "
         "one of them.");
   }
-  if (!export_path.empty() && vectors.descriptor == ImageVectorOptions::Descriptor::kAsmk) {
-    throw OptionsError(
-        "--GraphMatching.export_vectors writes a row of numbers for each image, and "
-        "visual words are none: add --GraphMatching.descriptor fisher.");
-  }
   if (!export_path.empty() && (given || !ranking_path.empty())) {
     throw OptionsError(
         "--GraphMatching.export_vectors writes vectors that this program makes: there are none "
         "with --GraphMatching.ranking_path or --GraphMatching.vectors_path.");
+  }
+  if (!export_path.empty() && vectors.descriptor == ImageVectorOptions::Descriptor::kAsmk) {
+    throw OptionsError(
+        "--GraphMatching.export_vectors writes a row of numbers for each image, and "
+        "visual words are none: add --GraphMatching.descriptor fisher.");
   }
 }
 

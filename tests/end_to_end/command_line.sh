@@ -146,18 +146,18 @@ tested_pairs "$work/two.db" | cmp - "$work/undisturbed.txt"
 check_integrity "$work/two.db"
 
 echo "== The paper's other systems"
-for strategy in sampling propagation retrieval briad; do
+for strategy in graphmatch sampling propagation retrieval briad; do
   cp "$work/untouched.db" "$work/$strategy.db"
   rm -f "$work/$strategy.db.graphmatch"
   expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/$strategy.db" --colmap_path "$fake" \
-    --GraphMatching.strategy "$strategy" --GraphMatching.num_retrieved_images 3
+    --GraphMatching.strategy "$strategy" --GraphMatching.num_retrieved_images 3 --GraphMatching.descriptor fisher
   echo "$strategy: $(grep -E 'sampling|propagation|retrieval|expansion|  all' "$work/output.txt" | tr -s ' \n' ' ')"
   check_integrity "$work/$strategy.db"
   expect_exit 0 'Nothing is left to test' "$matcher" --database_path "$work/$strategy.db" --colmap_path "$fake" \
-    --GraphMatching.strategy "$strategy" --GraphMatching.num_retrieved_images 3
+    --GraphMatching.strategy "$strategy" --GraphMatching.num_retrieved_images 3 --GraphMatching.descriptor fisher
 done
 (($(count_tested "$work/briad.db") > $(count_tested "$work/retrieval.db"))) || fail "no query expansion"
-(($(count_tested "$work/propagation.db") < $(count_tested "$database"))) || fail "more than one sampling"
+(($(count_tested "$work/propagation.db") < $(count_tested "$work/graphmatch.db"))) || fail "more than one sampling"
 
 echo "== Only the images of a list look for partners"
 cp "$work/untouched.db" "$work/some.db"

@@ -180,10 +180,10 @@ void PrintManPage(std::ostream& stream, const std::string& date) {
             "vocab_tree_matcher` and needs no vocabulary tree.");
   stream << ".PP\n";
   PrintText(stream,
-            "Each image is described by a Fisher vector under a Gaussian mixture that is learnt "
-            "from the collection itself. The matching graph is then explored by turns: sampling "
-            "tests the images that look most alike, propagation tests the neighbours of those that "
-            "matched, until nothing is left to test.");
+            "Each image is described by visual words that are learnt from the collection itself. "
+            "Sampling tests the images that look most alike, propagation the neighbours of those "
+            "that matched. Of both the likeliest pairs are tested next, as far as the tests before "
+            "tell, until no pair is likely.");
   stream << ".PP\n";
   PrintText(stream,
             "A run that was interrupted goes on when the same command is given again, and no pair "

@@ -14,6 +14,14 @@ const numEdges = report.edge_list.length;
 const components = report.connected_components;
 const minInliers = report.min_num_inliers;
 // In the order of a run; then those that this page does not know yet.
+// What makes the strategy test more pairs, if there is such an option.
+function moreTests() {
+  return {
+    best_first: 'lower --GraphMatching.min_edge_probability',
+    graphmatch: 'higher --GraphMatching.max_tests_for_sampling',
+  }[report.strategy];
+}
+
 const stageNames = [...new Set(['sampling', 'propagation', 'listed', 'retrieval', 'expansion',
   'likeliest', ...Object.keys(report.stages)])];
 
@@ -332,9 +340,8 @@ function showDiscovery() {
     let advice = `In the last tenth of its tests this run found ${plural(end.edges - before.edges, 'edge')}, ` +
       `${percent(share)} of the pairs.`;
     if (!report.finished) advice += ' It was not finished: the same command goes on.';
-    else if (share > 0.05 && report.strategy === 'graphmatch') {
-      advice += ' That is still a good deal: with a higher --GraphMatching.max_tests_for_sampling it would go on to ' +
-        'find more.';
+    else if (share > 0.05 && moreTests()) {
+      advice += ` That is still a good deal: with a ${moreTests()} it would go on to find more.`;
     }
     byId('discovery-advice').append(...prose(advice));
   }
@@ -998,7 +1005,7 @@ function explainAlone({image, features, failed = 0, candidates}) {
   } else {
     texts.push('None of those that look most like it shares enough with it. It is the only photo of its place, or ' +
       'those that would match it look too different: more photos around it help' +
-      (report.strategy === 'graphmatch' ? ', or a higher --GraphMatching.max_tests_for_sampling.' : '.'));
+      (moreTests() ? `, or a ${moreTests()}.` : '.'));
   }
   if (features > 0 && features < 200) {
     texts.push(`It has few features (${count(features)}): little texture, blur, or a small photo.`);
