@@ -268,10 +268,7 @@ void Table::AddVectors() {
       TextOf(&vectors.image_path, "the path of a directory", OptionRow::Path::kDirectory),
       "the directory of the photos: to show them in the report, and for the descriptor gist")
       .is_common = true;
-  AddFor(
-      "--GraphMatching.descriptor file",
-      [&vectors] { return vectors.descriptor == Descriptor::kFile; }, "GraphMatching.vectors_path",
-      TextOf(&vectors.vectors_path, "the path of a .npy file"),
+  Add("GraphMatching.vectors_path", TextOf(&vectors.vectors_path, "the path of a .npy file"),
       "for the descriptor file: a NumPy array, a row of float32 or float64 for each image; the "
       "images' names are in the file of the same name with .txt instead of .npy, one a line");
   Add("GraphMatching.export_vectors", TextOf(&ranking.export_path, "the path of a .npy file"),
