@@ -46,8 +46,8 @@ class GeometryVerifier {
   // For a pair with too few matches to be given to Verify.
   virtual TwoViewConfiguration ConfigurationOfUnmatched() const = 0;
 
-  // How many times as many pairs as COLMAP alone it should get at least, so that they are worth a
-  // start of COLMAP.
+  // How many times as many pairs as COLMAP alone it should get, so that they are worth a start of
+  // COLMAP; fewer only in batches that would keep few cores busy.
   virtual std::size_t UsualSizeOfShards() const { return 1; }
 
   // What a user is told who asks why it fails on everything; empty, or a sentence.

@@ -107,19 +107,20 @@ next=0
 while kill -0 "$pid" 2>/dev/null; do
   tested=$(count_tested "$work/disturbed.db")
   # (Not the one that is asked for its options before anything else.)
-  # Once: a shard on which COLMAP fails twice is taken apart, and RANSAC then draws other samples.
-  if ((kills == 0)) &&
+  # A batch later, so that another shard is hit: one on which COLMAP fails twice is taken apart, and RANSAC then draws
+  # other samples.
+  if ((kills < 2 && tested >= next)) &&
     pkill -KILL --oldest --parent "$pid" --full 'matches_importer --database_path'; then
-    kills=1
-    next=$((tested + 64))
+    kills=$((kills + 1))
+    next=$((tested + 100))
   fi
-  if ((kills == 1 && tested >= next)); then kill -INT "$pid" 2>/dev/null || true; fi
+  if ((kills == 2 && tested >= next)); then kill -INT "$pid" 2>/dev/null || true; fi
   sleep 0.2
 done
 code=0
 wait "$pid" || code=$?
 [[ $code == 130 ]] || { cat "$work/disturbed.txt"; fail "exit code $code after Ctrl-C"; }
-((kills == 1)) || fail "COLMAP was not killed"
+((kills == 2)) || fail "COLMAP was killed $kills times"
 check_integrity "$work/disturbed.db"
 echo "interrupted at $(count_tested "$work/disturbed.db") pairs"
 expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/disturbed.db"

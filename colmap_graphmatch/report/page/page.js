@@ -13,7 +13,6 @@ const numImages = names.length;
 const numEdges = report.edge_list.length;
 const components = report.connected_components;
 const minInliers = report.min_num_inliers;
-// In the order of a run; then those that this page does not know yet.
 // What makes the strategy test more pairs, if there is such an option.
 function moreTests() {
   return {
@@ -22,6 +21,7 @@ function moreTests() {
   }[report.strategy];
 }
 
+// In the order of a run; then those that this page does not know yet.
 const stageNames = [...new Set(['sampling', 'propagation', 'listed', 'retrieval', 'expansion',
   'likeliest', ...Object.keys(report.stages)])];
 
