@@ -98,31 +98,47 @@ rows "$work/unmatched.db" >"$work/colmap.rows"
 rows "$work/undisturbed.db" | grep -F -x -f "$work/colmap.rows" | cmp - "$work/colmap.rows" ||
   fail "rows unlike COLMAP's"
 
+# disturbing_colmap PATH KILLED INTERRUPTING: writes a COLMAP that is killed in the middle of the first attempt at the
+# shards of these numbers, in the order in which they come, and that interrupts its caller after the shard of that number.
+# (By numbers, for a signal after some time may come too late.)
+disturbing_colmap() {
+  cat >"$1" <<END
+#!/bin/bash
+[[ "\$*" == matches_importer*--match_list_path* ]] || exec colmap "\$@"
+exec 9>>"$1.lock"
+flock 9
+list=\$(sed -E 's/.*--match_list_path ([^ ]+).*/\1/' <<<"\$*")
+sha256sum <"\$list" >>"$1.shards"
+attempts=\$(grep -c -F "\$(sha256sum <"\$list")" "$1.shards")
+number=\$(sort -u "$1.shards" | wc -l)
+exec 9>&-
+if ((attempts == 1)) && [[ " $2 " == *" \$number "* ]]; then
+  colmap "\$@" &
+  sleep 0.1
+  echo "\$number" >>"$1.killed"
+  kill -KILL \$! \$\$
+fi
+colmap "\$@"
+code=\$?
+if ((number == $3)); then kill -INT \$PPID; fi
+exit \$code
+END
+  chmod +x "$1"
+}
+
+# interrupted DATABASE COLMAP [OPTION VALUE]...: the run ends by the interruption, before it is through.
+interrupted() {
+  expect_exit 130 'run the same command again' "$matcher" --database_path "$1" --colmap_path "$2" "${@:3}"
+  check_integrity "$1"
+  echo "interrupted at $(count_tested "$1") pairs"
+}
+
 echo "== COLMAP killed while it works, then Ctrl-C, then the same command again"
 cp "$work/features.db" "$work/disturbed.db"
-"$matcher" --database_path "$work/disturbed.db" >"$work/disturbed.txt" 2>&1 &
-pid=$!
-kills=0
-next=0
-while kill -0 "$pid" 2>/dev/null; do
-  tested=$(count_tested "$work/disturbed.db")
-  # (Not the one that is asked for its options before anything else.)
-  # A batch later, so that another shard is hit: one on which COLMAP fails twice is taken apart, and RANSAC then draws
-  # other samples.
-  if ((kills < 2 && tested >= next)) &&
-    pkill -KILL --oldest --parent "$pid" --full 'matches_importer --database_path'; then
-    kills=$((kills + 1))
-    next=$((tested + 100))
-  fi
-  if ((kills == 2 && tested >= next)); then kill -INT "$pid" 2>/dev/null || true; fi
-  sleep 0.2
-done
-code=0
-wait "$pid" || code=$?
-[[ $code == 130 ]] || { cat "$work/disturbed.txt"; fail "exit code $code after Ctrl-C"; }
-((kills == 2)) || fail "COLMAP was killed $kills times"
-check_integrity "$work/disturbed.db"
-echo "interrupted at $(count_tested "$work/disturbed.db") pairs"
+disturbing_colmap "$work/disturbing_colmap" '1 4' 6
+interrupted "$work/disturbed.db" "$work/disturbing_colmap"
+(($(wc -l <"$work/disturbing_colmap.killed") == 2)) || fail "COLMAP was not killed twice"
+(($(count_tested "$work/disturbed.db") < $(count_tested "$work/undisturbed.db"))) || fail "the interruption came too late"
 expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/disturbed.db"
 check "$work/disturbed.db"
 content "$work/disturbed.db" | cmp - "$work/undisturbed.content" || fail "another result after a disturbance"
@@ -149,13 +165,9 @@ cp "$work/features.db" "$work/exhaustive.db"
 "$matcher" --database_path "$work/exhaustive.db" --GraphMatching.strategy exhaustive >"$work/exhaustive.txt" 2>&1
 content "$work/exhaustive.db" >"$work/exhaustive.content"
 cp "$work/features.db" "$work/interrupted.db"
-"$matcher" --database_path "$work/interrupted.db" --GraphMatching.strategy exhaustive \
-  >"$work/interrupted.txt" 2>&1 &
-pid=$!
-while kill -0 "$pid" 2>/dev/null && (($(count_tested "$work/interrupted.db") < 100)); do sleep 0.05; done
-kill -INT "$pid"
-wait "$pid" || true
-echo "interrupted at $(count_tested "$work/interrupted.db") pairs"
+disturbing_colmap "$work/interrupting_colmap" '' 3
+interrupted "$work/interrupted.db" "$work/interrupting_colmap" --GraphMatching.strategy exhaustive
+(($(count_tested "$work/interrupted.db") < 820)) || fail "the interruption came too late"
 expect_exit 0 'Pairs tested' "$matcher" --database_path "$work/interrupted.db" --GraphMatching.strategy exhaustive
 content "$work/interrupted.db" | cmp - "$work/exhaustive.content" || fail "another result after an interruption"
 
