@@ -299,6 +299,22 @@ TEST(Watermark, MarksOfBothImagesAreOne) {
   EXPECT_FALSE(is_watermark({}));
 }
 
+TEST(Watermark, NeedsTheSizesOfBothImages) {
+  const Camera camera = SyntheticCamera(false);
+  const std::vector<PointPair> mark(20, PointPair{20, 750, 25, 747});
+  std::vector<std::size_t> inliers(mark.size());
+  for (std::size_t i = 0; i < inliers.size(); ++i) inliers[i] = i;
+  EXPECT_TRUE(IsWatermark(camera, camera, mark, inliers, 4));
+  Camera no_width = camera;
+  no_width.width = 0;
+  Camera no_height = camera;
+  no_height.height = -1;
+  for (const Camera& unknown : {Camera(), no_width, no_height}) {
+    EXPECT_FALSE(IsWatermark(unknown, camera, mark, inliers, 4));
+    EXPECT_FALSE(IsWatermark(camera, unknown, mark, inliers, 4));
+  }
+}
+
 TEST(Watermark, MakesThePairOne) {
   Random random({6});
   std::vector<PointPair> mark;

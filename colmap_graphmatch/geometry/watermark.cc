@@ -13,6 +13,8 @@ bool IsInBorder(const Camera& camera, double x, double y) {
   return !(x >= border && x <= width - border && y >= border && y <= height - border);
 }
 
+bool HasSize(const Camera& camera) { return camera.width > 0 && camera.height > 0; }
+
 struct Shift {
   double x = 0;
   double y = 0;
@@ -23,7 +25,7 @@ struct Shift {
 bool IsWatermark(const Camera& camera1, const Camera& camera2,
                  const std::vector<PointPair>& matches, const std::vector<std::size_t>& inliers,
                  double max_error) {
-  if (inliers.empty()) return false;
+  if (inliers.empty() || !HasSize(camera1) || !HasSize(camera2)) return false;
   const double num_needed = kMinWatermarkInliers * static_cast<double>(inliers.size());
   const auto num_in_border = std::count_if(inliers.begin(), inliers.end(), [&](std::size_t i) {
     return IsInBorder(camera1, matches[i].x1, matches[i].y1) &&
