@@ -143,10 +143,9 @@ void Console::Watch() {
   while (!ended_.wait_for(lock, kFrame, [this] { return ends_; })) {
     if (interrupted_ && !said_interrupted_) {
       said_interrupted_ = true;
-      Log(spdlog::level::info,
-          has_progress_
-              ? "Stopping after the pairs that COLMAP is working on; once more gives them up."
-              : "Stopping.");
+      Log(spdlog::level::info, has_progress_
+                                   ? "Stopping after the pairs at work; once more gives them up."
+                                   : "Stopping.");
     }
     if (!has_progress_) continue;
     const double seconds = Seconds();
