@@ -7,6 +7,10 @@
 namespace colmap_graphmatch {
 namespace {
 
+constexpr const char* kAdviceOnInliers =
+    ". Were features extracted again after matching? Delete the rows of matches and "
+    "two_view_geometries, so that these pairs are matched again.";
+
 // False for keys that COLMAP never writes, e.g. with the larger id first: they name no pair.
 bool IsColmapsKey(PairId pair_id) {
   const ImagePair pair = DecodePair(pair_id);
@@ -67,12 +71,10 @@ FeatureMatches Database::ReadMatchesFrom(const std::string& table, const ImagePa
   try {
     return DecodeMatches(select, 0, num_features(pair.id1), num_features(pair.id2));
   } catch (const DatabaseError& error) {
-    throw DamagedMatchesError(
-        "The matches in the table " + table + " that " + Path().string() +
-        " has for the images with ids " + std::to_string(pair.id1) + " and " +
-        std::to_string(pair.id2) + " contain " + error.what() +
-        ". Were features extracted again after matching? Delete the rows of matches and "
-        "two_view_geometries, so that these pairs are matched again.");
+    throw DamagedMatchesError("The matches in the table " + table + " that " + Path().string() +
+                              " has for the images with ids " + std::to_string(pair.id1) + " and " +
+                              std::to_string(pair.id2) + " contain " + error.what() +
+                              (table == "matches" ? kAdviceOnUnverifiedMatches : kAdviceOnInliers));
   }
 }
 

@@ -13,6 +13,13 @@ inline bool Contains(const std::vector<std::string>& values, const std::string& 
   return std::find(values.begin(), values.end(), value) != values.end();
 }
 
+// What follows what is wrong with matches that were stored and not verified. What was verified is
+// not to be lost with them.
+inline constexpr const char* kAdviceOnUnverifiedMatches =
+    ". Were features extracted again after matching? Delete matches that were not verified, so "
+    "that these pairs are matched again: sqlite3 FILE \"DELETE FROM matches WHERE pair_id NOT IN "
+    "(SELECT pair_id FROM two_view_geometries)\".";
+
 // Notices a table whose rows do not come in the order of their keys: in a damaged file, the same
 // rows can come again and again, without end.
 class AscendingKeys {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "colmap_graphmatch/base/errors.h"
+#include "colmap_graphmatch/database/rows.h"
 #include "colmap_graphmatch/database/sqlite.h"
 #include "colmap_graphmatch/database/two_view_geometry_codec.h"
 
@@ -45,13 +46,10 @@ void CheckCopiedMatches(sqlite::Connection& shard, const std::filesystem::path& 
     try {
       DecodeMatches(select, 0, NumKeypoints(shard, pair.id1), NumKeypoints(shard, pair.id2));
     } catch (const DatabaseError& error) {
-      throw DatabaseError(
-          "The matches that " + database_path.string() + " has for the images with ids " +
-          std::to_string(pair.id1) + " and " + std::to_string(pair.id2) + " contain " +
-          error.what() +
-          ". Were features extracted again after matching? Delete matches that were not "
-          "verified, so that these pairs are matched again: sqlite3 FILE \"DELETE FROM matches "
-          "WHERE pair_id NOT IN (SELECT pair_id FROM two_view_geometries)\".");
+      throw DatabaseError("The matches that " + database_path.string() +
+                          " has for the images with ids " + std::to_string(pair.id1) + " and " +
+                          std::to_string(pair.id2) + " contain " + error.what() +
+                          kAdviceOnUnverifiedMatches);
     }
   }
 }

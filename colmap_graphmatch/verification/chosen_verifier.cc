@@ -1,5 +1,7 @@
 #include "colmap_graphmatch/verification/chosen_verifier.h"
 
+#include <cstddef>
+#include <string>
 #include <utility>
 
 namespace colmap_graphmatch {
@@ -19,6 +21,23 @@ void WarnOfColmapsOptions(const GeometryOptions& options,
   on_warning("Only COLMAP has these options of verification, which have no effect: " + names + ".");
 }
 
+// Users look for the mistake in one image, so one is named.
+void WarnOfUnusableCameras(const CamerasOfImages& cameras, const std::vector<ImageRecord>& images,
+                           const std::string& consequence,
+                           const std::function<void(const std::string&)>& on_warning) {
+  std::size_t num_unusable = 0;
+  std::string first;
+  for (const ImageRecord& image : images) {
+    const std::optional<std::string> why = cameras.WhyUnusable(image.id);
+    if (!why) continue;
+    if (num_unusable++ == 0) first = "that of \"" + image.name + "\": " + *why;
+  }
+  if (num_unusable == 0) return;
+  on_warning(std::to_string(num_unusable) +
+             " images have cameras that the fast fit cannot work with (the first is " + first +
+             "): " + consequence);
+}
+
 }  // namespace
 
 ChosenVerifier::ChosenVerifier(const VerificationOptions& options, const VerificationPlan& plan,
@@ -32,13 +51,10 @@ ChosenVerifier::ChosenVerifier(const VerificationOptions& options, const Verific
   }
   if (plan.verifier == Verifier::kColmap) return;
   CamerasOfImages cameras(images, database.ReadCameras());
-  const std::size_t num_unusable = cameras.NumUnusable();
-  if (num_unusable > 0) {
-    on_warning(std::to_string(num_unusable) +
-               " images have cameras that the fast fit cannot work with: " +
-               (colmap_ ? "COLMAP gets their pairs as they are."
-                        : "their focal lengths count as not known."));
-  }
+  WarnOfUnusableCameras(
+      cameras, images,
+      colmap_ ? "COLMAP gets their pairs as they are." : "their focal lengths count as not known.",
+      on_warning);
   if (plan.verifier == Verifier::kNative) {
     WarnOfColmapsOptions(options.geometry, on_warning);
     native_.emplace(options.geometry, std::move(cameras), database.ConfigurationOfUnmatched());

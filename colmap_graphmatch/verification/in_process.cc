@@ -41,11 +41,9 @@ const Camera* CamerasOfImages::Of(ImageId image) const {
 }
 
 bool CamerasOfImages::CanJudge(const ImagePair& pair) const {
+  if (WhyUnusable(pair.id1) || WhyUnusable(pair.id2)) return false;
   const Camera* first = Of(pair.id1);
   const Camera* second = Of(pair.id2);
-  if (first == nullptr || second == nullptr || WhyNotUsable(*first) || WhyNotUsable(*second)) {
-    return false;
-  }
   // Later versions of COLMAP fit rays, not pixels, where lines in the image are bent.
   const auto is_straight = [](const Camera& camera) {
     return FindCameraModel(camera.model_id)->projection == Projection::kPerspective;
@@ -54,12 +52,9 @@ bool CamerasOfImages::CanJudge(const ImagePair& pair) const {
          (first->has_prior_focal_length && second->has_prior_focal_length);
 }
 
-std::size_t CamerasOfImages::NumUnusable() const {
-  return static_cast<std::size_t>(
-      std::count_if(camera_of_.begin(), camera_of_.end(), [this](const auto& entry) {
-        const Camera* camera = Of(entry.first);
-        return camera == nullptr || WhyNotUsable(*camera);
-      }));
+std::optional<std::string> CamerasOfImages::WhyUnusable(ImageId image) const {
+  const Camera* camera = Of(image);
+  return camera == nullptr ? "it is missing" : WhyNotUsable(*camera);
 }
 
 }  // namespace colmap_graphmatch

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "colmap_graphmatch/base/camera.h"
@@ -41,8 +43,9 @@ class CamerasOfImages {
   // length is not known.
   bool CanJudge(const ImagePair& pair) const;
 
-  // Images whose cameras make no sense or have no image plane.
-  std::size_t NumUnusable() const;
+  // What is wrong with the camera of an image that was given, in words: it is missing, makes no
+  // sense or has no image plane; nothing if it is in order.
+  std::optional<std::string> WhyUnusable(ImageId image) const;
 
  private:
   std::map<ImageId, CameraId> camera_of_;

@@ -275,6 +275,13 @@ fresh
 change 'PRAGMA ignore_check_constraints = ON; UPDATE images SET image_id = 2147483647 WHERE image_id = 3'
 says 2 'An id outside the range of COLMAP' "${run[@]}"
 
+fresh
+change 'UPDATE cameras SET model = 99'
+says 0 'A camera that makes no sense' "${run[@]}"
+fresh
+change 'INSERT INTO matches VALUES(2147483647 + 2, 1, 2, zeroblob(7))'
+partial=yes says 2 'Matches that were stored before are damaged' "${run[@]}"
+
 theme names
 # works WHAT: as if it had a plain name.
 works() {
