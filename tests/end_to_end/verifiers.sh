@@ -131,7 +131,7 @@ good=
 for feature in {0..39}; do good+=$(printf '%02x000000%02x000000' "$feature" "$feature"); done
 stored() { echo "INSERT INTO matches VALUES(2147483647 * $1 + $2, $3, 2, $4);"; }
 
-for one in native screened colmap; do
+for one in ${GRAPHMATCH_VERIFIERS:-native screened colmap}; do
   use $one
   fresh "$work/new.db"
   expect_exit 0 'Pairs tested       276 of 276' "${run[@]}"
