@@ -57,11 +57,7 @@ ColmapVerifier::ColmapVerifier(const VerificationOptions& options, const Verific
   shards_have_descriptors_ =
       !plan_.matches_here || options.geometry.guided_matching.value_or(false);
   arguments_ = FindArguments(on_warning);
-  // COLMAP's least number of trials, to which it raises all others: seven of seven matches are
-  // inliers in every fifth of them.
-  arguments_for_most_ = ArgumentsForInliers(0.8, 100);
-  // As many as it takes by confidence to find such seven once.
-  arguments_for_half_ = ArgumentsForInliers(0.5, 2643);
+  arguments_for_half_ = ArgumentsForHalfInliers();
   MakeTemplate();
 }
 
@@ -84,13 +80,14 @@ std::vector<std::string> ColmapVerifier::FindArguments(
   return arguments;
 }
 
-std::vector<std::string> ColmapVerifier::ArgumentsForInliers(double share,
-                                                             int max_num_trials) const {
+std::vector<std::string> ColmapVerifier::ArgumentsForHalfInliers() const {
   VerificationOptions options = options_;
   GeometryOptions& geometry = options.geometry;
+  // As many as it takes by COLMAP's confidence to draw seven inliers once.
+  constexpr int kMaxNumTrials = 2643;
   geometry.max_num_trials =
-      std::min(max_num_trials, geometry.max_num_trials.value_or(max_num_trials));
-  if (!colmap_.RejectsByInlierRatio()) geometry.min_inlier_ratio = share;
+      std::min(kMaxNumTrials, geometry.max_num_trials.value_or(kMaxNumTrials));
+  if (!colmap_.RejectsByInlierRatio()) geometry.min_inlier_ratio = 0.5;
   std::vector<std::string> unknown;  // They were warned of.
   return colmap_.Arguments(ColmapOptions(options, plan_), &unknown);
 }
@@ -188,9 +185,7 @@ std::vector<std::string> ColmapVerifier::Command(const std::filesystem::path& di
                                       "--match_type",
                                       "pairs"};
   const std::vector<std::string>& arguments =
-      trials == Trials::kForMostInliers   ? arguments_for_most_
-      : trials == Trials::kForHalfInliers ? arguments_for_half_
-                                          : arguments_;
+      trials == Trials::kForHalfInliers ? arguments_for_half_ : arguments_;
   command.insert(command.end(), arguments.begin(), arguments.end());
   return command;
 }

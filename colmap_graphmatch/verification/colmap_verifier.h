@@ -43,8 +43,8 @@ class ColmapVerifier : public GeometryVerifier {
     return Verify(pairs, Trials::kAsAsked, should_stop);
   }
 
-  // kForMostInliers, kForHalfInliers: as many as matches take of which most, or half, are inliers.
-  enum class Trials { kAsAsked, kForMostInliers, kForHalfInliers };
+  // kForHalfInliers: as many as matches take of which half or more are inliers.
+  enum class Trials { kAsAsked, kForHalfInliers };
   ShardOutcome Verify(const std::vector<PairToVerify>& pairs, Trials trials,
                       const std::function<bool()>& should_stop);
   TwoViewConfiguration ConfigurationOfUnmatched() const override;
@@ -56,7 +56,7 @@ class ColmapVerifier : public GeometryVerifier {
  private:
   std::vector<std::string> FindArguments(
       const std::function<void(const std::string&)>& on_warning) const;
-  std::vector<std::string> ArgumentsForInliers(double share, int max_num_trials) const;
+  std::vector<std::string> ArgumentsForHalfInliers() const;
   void MakeTemplate() const;
   // In this directory, with a list of its pairs.
   ShardFeatures MakeShard(const std::filesystem::path& directory,
@@ -76,12 +76,11 @@ class ColmapVerifier : public GeometryVerifier {
   const StopRequest& stop_;
   bool shards_have_descriptors_ = true;
   std::vector<std::string> arguments_;  // Of every run of matches_importer.
-  std::vector<std::string> arguments_for_most_;
   std::vector<std::string> arguments_for_half_;
 
   mutable std::mutex mutex_;  // Of what follows.
   Statistics statistics_;
-  std::array<double, 3> slowest_seconds_per_pair_ = {};  // By Trials; 0 until a shard came back.
+  std::array<double, 2> slowest_seconds_per_pair_ = {};  // By Trials; 0 until a shard came back.
 };
 
 }  // namespace colmap_graphmatch

@@ -18,7 +18,8 @@ constexpr double kMinShareOfInliers = 0.86;
 
 // A pair with fewer than this share (41 of 15) is close: whether COLMAP finds the last inlier
 // depends on how long it searches, which is the shorter the fewer outliers there are. So it gets at
-// least so many matches for each inlier, the nearest first, and trials for them.
+// least so many matches for each inlier, the nearest first; trials are for them in all pairs.
+// (Pairs with few outliers need fewer, but not by as much as another start of COLMAP.)
 constexpr double kMaxCloseShare = 2.7;
 constexpr double kPadding = 2;
 
@@ -72,7 +73,6 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
   ShardOutcome outcome;
   outcome.results.resize(pairs.size());
   Question trimmed;
-  Question close;
   Question whole;
   FitStatistics statistics;
   const double start = ThreadCpuSeconds();
@@ -106,7 +106,7 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
     PairToVerify kept;
     kept.pair = pair.pair;
     kept.matches = Nearest(*pair.matches, screened.errors, kBound, least_num);
-    (is_close ? close : trimmed).Add(std::move(kept), i);
+    trimmed.Add(std::move(kept), i);
   }
   statistics.seconds = ThreadCpuSeconds() - start;
 
@@ -125,10 +125,9 @@ ShardOutcome ScreenedVerifier::Verify(const std::vector<PairToVerify>& pairs,
     }
     return true;
   };
-  outcome.asked_colmap = !(trimmed.pairs.empty() && close.pairs.empty() && whole.pairs.empty());
+  outcome.asked_colmap = !(trimmed.pairs.empty() && whole.pairs.empty());
   using Trials = ColmapVerifier::Trials;
-  if (ask_colmap(trimmed, Trials::kForMostInliers) && ask_colmap(close, Trials::kForHalfInliers) &&
-      ask_colmap(whole, Trials::kAsAsked)) {
+  if (ask_colmap(trimmed, Trials::kForHalfInliers) && ask_colmap(whole, Trials::kAsAsked)) {
     const std::lock_guard<std::mutex> lock(mutex_);
     statistics_.seconds += statistics.seconds;
     statistics_.num_fitted += statistics.num_fitted;

@@ -28,8 +28,8 @@ class ScreenedVerifier : public GeometryVerifier {
     return colmap_.ConfigurationOfUnmatched();
   }
   std::string AdviceOnFailure() const override { return colmap_.AdviceOnFailure(); }
-  // COLMAP has less to do for each, and is started for likely and for close pairs. (With larger
-  // ones it would start less often, and in small batches many cores would have nothing to do.)
+  // COLMAP has less to do for each. (With larger ones it would start less often, and in small
+  // batches many cores would have nothing to do.)
   std::size_t UsualSizeOfShards() const override { return 2; }
 
   // Of all calls of Verify so far.
