@@ -132,7 +132,7 @@ for feature in {0..39}; do good+=$(printf '%02x000000%02x000000' "$feature" "$fe
 stored() { echo "INSERT INTO matches VALUES(2147483647 * $1 + $2, $3, 2, $4);"; }
 
 for one in ${GRAPHMATCH_VERIFIERS:-native screened colmap}; do
-  use $one
+  use "$one"
   fresh "$work/new.db"
   expect_exit 0 'Pairs tested       276 of 276' "${run[@]}"
   content "$healthy" >"$work/$verifier.healthy"
