@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -201,6 +202,74 @@ TEST_P(AnySchema, ReadsCameras) {
   EXPECT_EQ(camera.height, 480);
   EXPECT_THAT(camera.params, ElementsAre(1000, 320, -0.5, 0.1));
   EXPECT_TRUE(camera.has_prior_focal_length);
+}
+
+TEST_F(DatabaseTest, PositionsOfColumns) {
+  Write();
+  EXPECT_THAT(Open().ReadPositions(), IsEmpty());
+  Execute("UPDATE images SET prior_tx = 48.5, prior_ty = -2.25, prior_tz = 30 WHERE image_id = 2");
+  Execute("UPDATE images SET prior_tx = 0, prior_ty = 0, prior_tz = 0 WHERE image_id = 3");
+  const std::map<ImageId, PositionPrior> geographic = Open().ReadPositions();
+  ASSERT_THAT(geographic, SizeIs(1));
+  EXPECT_EQ(geographic.at(2).system, PositionPrior::System::kGeographic);
+  EXPECT_THAT(geographic.at(2).position, ElementsAre(48.5, -2.25, 30));
+  EXPECT_EQ(geographic.at(2).accuracy, 0);
+  // No latitude.
+  Execute("UPDATE images SET prior_tx = 480, prior_ty = 1, prior_tz = 3 WHERE image_id = 1");
+  const std::map<ImageId, PositionPrior> cartesian = Open().ReadPositions();
+  ASSERT_THAT(cartesian, SizeIs(2));
+  EXPECT_EQ(cartesian.at(2).system, PositionPrior::System::kCartesian);
+}
+
+TEST_F(DatabaseTest, PositionsOfPosePriors) {
+  Write(Schema::kColmap310);
+  EXPECT_THAT(Open().ReadPositions(), IsEmpty());
+  // As they are stored: 1, 2 and 0.5; and a matrix with 4, NaN and 1 on its diagonal, or 4, 9, 1.
+  const std::string numbers = "000000000000F03F0000000000000040000000000000E03F";
+  const std::string none = "0000000000000000";
+  const std::string variances[] = {"0000000000001040", "0000000000002240", "000000000000F03F"};
+  const std::string nan = "000000000000F87F";
+  const auto covariance = [&](const std::string& middle) {
+    return "x'" + variances[0] + none + none + none + middle + none + none + none + variances[2] +
+           "'";
+  };
+  Execute(
+      "CREATE TABLE pose_priors(image_id INTEGER PRIMARY KEY NOT NULL, position BLOB, "
+      "coordinate_system INTEGER NOT NULL, position_covariance BLOB)");
+  EXPECT_THAT(Open().ReadPositions(), IsEmpty());
+  // Two of three numbers are none.
+  Execute("INSERT INTO pose_priors VALUES(1, x'" + numbers + "', 0, NULL), (2, x'" + numbers +
+          "', 1, " + covariance(variances[1]) + "), (3, x'" + numbers.substr(0, 32) +
+          "', 0, NULL), (4, NULL, 0, NULL), (5, x'" + numbers.substr(0, 32) + nan + "', -1, " +
+          covariance(nan) + "), (6, 'text', 'text', 'text')");
+  const std::map<ImageId, PositionPrior> positions = Open().ReadPositions();
+  ASSERT_THAT(positions, SizeIs(3));
+  EXPECT_EQ(positions.at(1).system, PositionPrior::System::kGeographic);
+  EXPECT_EQ(positions.at(1).accuracy, 0);
+  EXPECT_EQ(positions.at(2).system, PositionPrior::System::kCartesian);
+  EXPECT_THAT(positions.at(2).position, ElementsAre(1, 2, 0.5));
+  EXPECT_EQ(positions.at(2).accuracy, 3);
+  EXPECT_TRUE(std::isnan(positions.at(5).position[2]));
+  EXPECT_TRUE(std::isfinite(positions.at(5).accuracy));
+}
+
+TEST_F(DatabaseTest, PositionsOfWhatCamerasSaw) {
+  Write(Schema::kColmap42);
+  Execute(
+      "CREATE TABLE pose_priors(pose_prior_id INTEGER PRIMARY KEY NOT NULL, corr_data_id INTEGER "
+      "NOT NULL, corr_sensor_id INTEGER NOT NULL, corr_sensor_type INTEGER NOT NULL, position "
+      "BLOB, position_covariance BLOB, gravity BLOB, coordinate_system INTEGER NOT NULL)");
+  const std::string numbers = "x'000000000000F03F0000000000000040000000000000E03F'";
+  // The second is of another sensor.
+  Execute("INSERT INTO pose_priors VALUES(1, 3, 1, 0, " + numbers + ", NULL, NULL, 0), (2, 2, 1, " +
+          "1, " + numbers + ", NULL, NULL, 0)");
+  const std::map<ImageId, PositionPrior> positions = Open().ReadPositions();
+  ASSERT_THAT(positions, SizeIs(1));
+  EXPECT_EQ(positions.at(3).system, PositionPrior::System::kGeographic);
+  EXPECT_THAT(positions.at(3).position, ElementsAre(1, 2, 0.5));
+  // Of a version that is not known.
+  Execute("ALTER TABLE pose_priors RENAME COLUMN position TO place");
+  EXPECT_THAT(Open().ReadPositions(), IsEmpty());
 }
 
 TEST_F(DatabaseTest, CamerasThatCannotBeAreReadAsTheyAre) {

@@ -9,6 +9,7 @@
 
 #include "colmap_graphmatch/base/camera.h"
 #include "colmap_graphmatch/base/pair_verifier.h"
+#include "colmap_graphmatch/base/position_prior.h"
 #include "colmap_graphmatch/base/two_view_geometry.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/features.h"
@@ -76,6 +77,11 @@ class Database {
   // at the same time.
   std::map<ImageId, std::uint32_t> ReadFrames();
 
+  // Where images were taken, of those of which it is known: GPS, or what a user has written. Of
+  // COLMAP before 3.10, which does not say what they are, the numbers are taken for GPS if all can
+  // be.
+  std::map<ImageId, PositionPrior> ReadPositions();
+
   // The pairs that have a row in `two_view_geometries`, ascending; keys that stand for no pair are
   // left out. (COLMAP's matchers also ask for
   // a row in `matches` before they skip a pair; what is verified is never verified again here.)
@@ -114,6 +120,8 @@ class Database {
 
  private:
   void CheckSchema();
+  std::map<ImageId, PositionPrior> ReadPosePriors(const std::vector<std::string>& columns);
+  std::map<ImageId, PositionPrior> ReadPositionsOfImages();
   FeatureMatches ReadMatchesFrom(const std::string& table, const ImagePair& pair);
   // Throws if these are not all features of the image.
   void CheckNumber(std::size_t num_rows, const ImageRecord& image) const;

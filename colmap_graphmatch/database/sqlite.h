@@ -124,6 +124,7 @@ class Statement {
 
   bool IsNull(int column) const;
   std::int64_t Int(int column) const;
+  double Double(int column) const;
   std::string Text(int column) const;
   // The bytes of a blob; valid until the next Step. Throws if SQLite cannot read them.
   const std::uint8_t* Data(int column) const;
