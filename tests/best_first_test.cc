@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -26,14 +27,28 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
+const ImagePriors kNoPriors;
+
 ExplorationResult RunBestFirst(const BestFirstOptions& options, const Ranking& ranking,
-                               RecordingVerifier* verifier, int num_threads = 2) {
+                               RecordingVerifier* verifier, int num_threads = 2,
+                               const ImagePriors& priors = kNoPriors) {
   ThreadPool threads(num_threads);
   const std::vector<ImageId> ids = MakeIds(ranking.NumVertices());
-  const auto make = [&] { return std::make_unique<BestFirstProposer>(options, ranking, threads); };
+  const auto make = [&] {
+    return std::make_unique<BestFirstProposer>(options, ranking, priors, threads);
+  };
   const std::unique_ptr<PairProposer> proposer = make();
   return Explore(*proposer, ids, *verifier, nullptr,
                  {ChooseSeeds(make, ids, *verifier, {}, StopRequest())});
+}
+
+// By vertex, with ids from 1 on.
+std::vector<ImageRecord> MakeImages(const std::vector<std::string>& names) {
+  std::vector<ImageRecord> images;
+  for (const std::string& name : names) {
+    images.push_back({static_cast<ImageId>(images.size() + 1), name, 1, 1});
+  }
+  return images;
 }
 
 // A graph of random tests with random inliers, and the same as plain sets.
@@ -174,11 +189,11 @@ void AddInSteps(const RandomGraph& random, std::size_t num_steps, PairEvidence* 
 }
 
 std::vector<Candidate> Collect(const PairEvidence& evidence, std::size_t num_nearest,
-                               const MatchingGraph& graph) {
+                               const MatchingGraph& graph, std::size_t num_near = 0) {
   std::vector<std::vector<Candidate>> parts(evidence.NumTasks());
-  evidence.VisitCandidates(num_nearest, graph, [&](std::size_t task, const Candidate& candidate) {
-    parts[task].push_back(candidate);
-  });
+  evidence.VisitCandidates(
+      num_nearest, num_near, graph,
+      [&](std::size_t task, const Candidate& candidate) { parts[task].push_back(candidate); });
   std::vector<Candidate> candidates;
   for (const std::vector<Candidate>& part : parts) {
     candidates.insert(candidates.end(), part.begin(), part.end());
@@ -205,7 +220,7 @@ TEST(PairEvidence, VisitsWhatTheDefinitionsSay) {
        {PairRestrictions(), EveryThirdIsAQuery(scene.num_vertices)}) {
     for (const std::uint64_t seed : {1, 2, 3}) {
       const RandomGraph random = MakeRandomGraph(scene.num_vertices, 0.15, seed);
-      PairEvidence evidence(ranking, restrictions, threads);
+      PairEvidence evidence(ranking, kNoPriors, restrictions, threads);
       AddInSteps(random, seed, &evidence);
       const auto may_be_tested = [&](Vertex a, Vertex c) {
         return a != c && restrictions.Allows(a, c) && !random.graph.IsTested(a, c);
@@ -252,7 +267,7 @@ TEST(PairEvidence, OfATestedPairDoesNotKnowOfTheTest) {
   const PairRestrictions none;
   // Also of pairs that may not be tested.
   for (const PairRestrictions& restrictions : {none, EveryThirdIsAQuery(scene.num_vertices)}) {
-    PairEvidence evidence(ranking, restrictions, threads);
+    PairEvidence evidence(ranking, kNoPriors, restrictions, threads);
     AddInSteps(whole, 2, &evidence);
     const std::vector<LabelledCues> described =
         evidence.WithoutThem(whole.tested, whole.graph, whole.tracks);
@@ -261,7 +276,7 @@ TEST(PairEvidence, OfATestedPairDoesNotKnowOfTheTest) {
       EXPECT_EQ(described[i].is_edge, whole.tested[i].is_edge);
       const VertexPair& pair = whole.tested[i].pair;
       const RandomGraph without = MakeRandomGraph(scene.num_vertices, 0.3, 7, {pair});
-      PairEvidence evidence_without(ranking, none, threads);
+      PairEvidence evidence_without(ranking, kNoPriors, none, threads);
       AddInSteps(without, 1, &evidence_without);
       EXPECT_EQ(evidence_without.Of(pair, without.graph), described[i].cues);
     }
@@ -332,6 +347,104 @@ TEST(BestFirst, FindsEdgesInFewerTestsThanTheLoop) {
     EXPECT_LT(TestsForRecall(recall, verifier, edges), TestsForRecall(recall, loop, edges))
         << recall;
   }
+}
+
+TEST(PairEvidence, OffersWhatIsNearByItsPriors) {
+  std::vector<std::vector<ScoredVertex>> lists(6);
+  const ListRanking ranking(lists);
+  ThreadPool threads(2);
+  const ImagePriors priors(MakeImages({"1.jpg", "2.jpg", "3.jpg", "4.jpg", "x.jpg", "y.jpg"}), {},
+                           threads);
+  const PairRestrictions restrictions;
+  PairEvidence evidence(ranking, priors, restrictions, threads);
+  MatchingGraph graph(6);
+  graph.Add({{{0, 1}, false}});
+  evidence.Add({{{0, 1}, false}}, graph, SharedTracks(6));
+  std::set<VertexPair> offered;
+  for (const Candidate& candidate : Collect(evidence, 1, graph, 1)) {
+    EXPECT_TRUE(offered.insert(candidate.pair).second);
+    EXPECT_EQ(candidate.cues[13], 1);
+    EXPECT_EQ(candidate.cues[14], 1.0 / (candidate.pair.second - candidate.pair.first));
+  }
+  // (0, 1) was tested.
+  EXPECT_EQ(offered, (std::set<VertexPair>{{0, 2}, {1, 2}, {2, 3}}));
+  EXPECT_THAT(Collect(evidence, 1, graph), IsEmpty());
+}
+
+// Tests until 0.95 of a scene's edges are found.
+std::size_t TestsWith(const ImagePriors& priors, const Scene& scene) {
+  const std::set<ImagePair> edges = ImageEdges(scene, MakeIds(scene.num_vertices));
+  RecordingVerifier verifier(edges);
+  RunBestFirst({}, MakeRanking(scene), &verifier, 2, priors);
+  return TestsForRecall(0.95, verifier, edges);
+}
+
+// What right ones save and wrong ones cost; to find out that they are wrong takes about a batch.
+template <typename Value, typename ToPriors>
+void ExpectRightOnesToHelp(std::vector<Value> values, const Scene& scene,
+                           const ToPriors& to_priors) {
+  const std::size_t without = TestsWith(kNoPriors, scene);
+  EXPECT_LT(TestsWith(to_priors(values), scene), without * 9 / 10);
+  Random random({5});
+  for (std::size_t i = values.size(); i > 1; --i) std::swap(values[i - 1], values[random.Index(i)]);
+  EXPECT_LT(TestsWith(to_priors(values), scene), without * 11 / 10);
+}
+
+TEST(BestFirst, RightPositionsHelpAndWrongOnesCostLittle) {
+  const Scene scene = MakeScene(12, 20, 4, 0.6, 3);
+  // Walks far apart, a metre from photo to photo, measured to 10 m.
+  std::vector<PositionPrior> positions(scene.num_vertices);
+  Random random({4});
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const double x = static_cast<double>(i % 20) + 10 * random.Uniform();
+    const double y = 10 * random.Uniform();
+    const double place = static_cast<double>(i / 20) / 100;
+    positions[i].position = {50 + place + x / 111000, 8 + y / 72000, 0};
+  }
+  ExpectRightOnesToHelp(positions, scene, [](const std::vector<PositionPrior>& of_vertices) {
+    std::map<ImageId, PositionPrior> by_id;
+    for (const PositionPrior& position : of_vertices) {
+      by_id[static_cast<ImageId>(by_id.size() + 1)] = position;
+    }
+    ThreadPool threads(2);
+    return ImagePriors(MakeImages(std::vector<std::string>(by_id.size(), "x.jpg")), by_id, threads);
+  });
+}
+
+TEST(BestFirst, RightSequencesHelpAndWrongOnesCostLittle) {
+  // Photos hardly look like their neighbours.
+  const Scene scene = MakeScene(6, 40, 3, 2.5, 12);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < scene.num_vertices; ++i) {
+    names.push_back("walk " + std::to_string(i / 40) + "/" + std::to_string(i) + ".jpg");
+  }
+  ExpectRightOnesToHelp(names, scene, [](const std::vector<std::string>& of_vertices) {
+    ThreadPool threads(2);
+    return ImagePriors(MakeImages(of_vertices), {}, threads);
+  });
+}
+
+TEST(BestFirst, LoopsOfSequencesClose) {
+  // Every walk is gone twice: half of the edges are far apart in its sequence.
+  const Scene scene = MakeScene(6, 40, 4, 0.6, 12);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < scene.num_vertices; ++i) {
+    names.push_back(std::to_string(i / 40) + "/" + std::to_string(i % 40 / 2 + i % 2 * 20));
+  }
+  ThreadPool threads(2);
+  const ImagePriors priors(MakeImages(names), {}, threads);
+  const std::vector<ImageId> ids = MakeIds(scene.num_vertices);
+  RecordingVerifier verifier(ImageEdges(scene, ids));
+  RunBestFirst({}, MakeRanking(scene), &verifier, 2, priors);
+  const std::set<ImagePair> tested(verifier.tested.begin(), verifier.tested.end());
+  std::size_t num_far = 0;
+  std::size_t num_found = 0;
+  for (const auto& [a, b] : scene.edges) {
+    if (a % 2 == b % 2) continue;
+    ++num_far;
+    num_found += tested.count(ImagePair(ids[a], ids[b]));
+  }
+  EXPECT_GE(num_found * 100, num_far * 97);
 }
 
 TEST(BestFirst, TestsTheSameOnAnyNumberOfThreads) {
@@ -471,7 +584,7 @@ TEST(BestFirst, UnlistedImagesAreNotTheNearest) {
   const ListRanking ranking(lists);
   const PairRestrictions restrictions;
   ThreadPool threads(1);
-  const PairEvidence evidence(ranking, restrictions, threads);
+  const PairEvidence evidence(ranking, kNoPriors, restrictions, threads);
   const MatchingGraph graph(4);
   const std::vector<Candidate> candidates = Collect(evidence, 5, graph);
   ASSERT_EQ(candidates.size(), 2U);

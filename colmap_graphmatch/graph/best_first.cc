@@ -13,6 +13,8 @@ namespace {
 // The nearest images of each: tested to begin with, and candidates at any time later.
 constexpr std::size_t kNumFirst = 1;
 constexpr std::size_t kNumNearest = 2;
+// Of each kind of prior. The first batch has none: it shows what they are worth.
+constexpr std::size_t kNumNear = 2;
 // Small batches choose best, and large ones keep many cores busy: with half of these 0.99 of the
 // edges of 569 photos take 1 % fewer tests, with twice as many 1.5 % more. A share of what was
 // tested keeps the number of batches small.
@@ -44,11 +46,11 @@ bool IsLikelier(const LikelyPair& a, const LikelyPair& b) {
 }  // namespace
 
 BestFirstProposer::BestFirstProposer(const BestFirstOptions& options, const Ranking& ranking,
-                                     ThreadPool& threads)
+                                     const ImagePriors& priors, ThreadPool& threads)
     : options_(options),
       ranking_(ranking),
       threads_(threads),
-      evidence_(ranking, options_.restrictions, threads),
+      evidence_(ranking, priors, options_.restrictions, threads),
       tracks_(ranking.NumVertices()) {
   options.Check();
 }
@@ -62,13 +64,13 @@ std::optional<Proposal> BestFirstProposer::Next(const MatchingGraph& graph) {
   proposal.iteration = num_batches_;
   if (tested_.empty()) {
     proposal.stage = LoopStage::kSampling;
-    proposal.pairs = Likeliest(std::numeric_limits<std::size_t>::max(), kNumFirst, 0, graph);
+    proposal.pairs = Likeliest(std::numeric_limits<std::size_t>::max(), kNumFirst, 0, 0, graph);
     expected_.all = kTestsPerFirst * static_cast<double>(proposal.pairs.size());
   } else {
     proposal.stage = LoopStage::kLikeliest;
     model_.Fit(tested_);
     proposal.pairs = Likeliest(std::max(kMinBatch, graph.NumTested() / kTestsPerPairOfBatch),
-                               kNumNearest, options_.min_edge_probability, graph);
+                               kNumNearest, kNumNear, options_.min_edge_probability, graph);
   }
   if (proposal.pairs.empty()) return std::nullopt;
   ++num_batches_;
@@ -80,16 +82,17 @@ std::optional<Proposal> BestFirstProposer::Next(const MatchingGraph& graph) {
 }
 
 std::vector<VertexPair> BestFirstProposer::Likeliest(std::size_t num, std::size_t num_nearest,
-                                                     double min_probability,
+                                                     std::size_t num_near, double min_probability,
                                                      const MatchingGraph& graph) {
   const bool is_for_model = options_.goal == BestFirstOptions::Goal::kModel;
   std::vector<std::vector<LikelyPair>> parts(evidence_.NumTasks());
-  evidence_.VisitCandidates(num_nearest, graph, [&](std::size_t task, const Candidate& candidate) {
-    const double probability = model_.Probability(candidate.cues);
-    if (probability < min_probability && !candidate.is_of_lonely) return;
-    if (is_for_model && HasEnoughWithout(candidate, graph)) return;
-    parts[task].push_back({probability, candidate.pair});
-  });
+  evidence_.VisitCandidates(num_nearest, num_near, graph,
+                            [&](std::size_t task, const Candidate& candidate) {
+                              const double probability = model_.Probability(candidate.cues);
+                              if (probability < min_probability && !candidate.is_of_lonely) return;
+                              if (is_for_model && HasEnoughWithout(candidate, graph)) return;
+                              parts[task].push_back({probability, candidate.pair});
+                            });
   std::vector<LikelyPair> likely;
   double num_edges = 0;
   for (std::vector<LikelyPair>& part : parts) {

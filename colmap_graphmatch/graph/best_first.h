@@ -20,8 +20,9 @@ namespace colmap_graphmatch {
 // evidence says (PairEvidence, EdgeModel) that is fitted anew to all tests after every batch.
 class BestFirstProposer : public PairProposer {
  public:
-  // ranking and threads must outlive it. Throws OptionsError.
-  BestFirstProposer(const BestFirstOptions& options, const Ranking& ranking, ThreadPool& threads);
+  // ranking, priors and threads must outlive it. Throws OptionsError.
+  BestFirstProposer(const BestFirstOptions& options, const Ranking& ranking,
+                    const ImagePriors& priors, ThreadPool& threads);
   ~BestFirstProposer() override = default;
   BestFirstProposer(const BestFirstProposer&) = delete;
   BestFirstProposer& operator=(const BestFirstProposer&) = delete;
@@ -35,7 +36,7 @@ class BestFirstProposer : public PairProposer {
  private:
   // Those as likely as asked for, and the pairs of lonely images: the likeliest num of them,
   // ascending.
-  std::vector<VertexPair> Likeliest(std::size_t num, std::size_t num_nearest,
+  std::vector<VertexPair> Likeliest(std::size_t num, std::size_t num_nearest, std::size_t num_near,
                                     double min_probability, const MatchingGraph& graph);
   void Learn(const std::vector<LabelledCues>& tests);
   // Brings the evidence up to date with the graph.

@@ -8,7 +8,7 @@ namespace colmap_graphmatch {
 
 // What is known of a pair before it is tested (graph/pair_evidence.h), as numbers of about the size
 // of 1; the first is always 1.
-inline constexpr std::size_t kNumCues = 11;
+inline constexpr std::size_t kNumCues = 15;
 using Cues = std::array<double, kNumCues>;
 
 struct LabelledCues {

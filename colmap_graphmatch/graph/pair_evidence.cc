@@ -158,9 +158,10 @@ class PairEvidence::Changes {
   std::vector<Vertex> touched_;
 };
 
-PairEvidence::PairEvidence(const Ranking& ranking, const PairRestrictions& restrictions,
-                           ThreadPool& threads)
+PairEvidence::PairEvidence(const Ranking& ranking, const ImagePriors& priors,
+                           const PairRestrictions& restrictions, ThreadPool& threads)
     : ranking_(ranking),
+      priors_(priors),
       restrictions_(restrictions),
       threads_(threads),
       num_tasks_(std::min((ranking.NumVertices() + kMinVerticesPerTask - 1) / kMinVerticesPerTask,
@@ -245,8 +246,8 @@ const PairEvidence::Entry* PairEvidence::Find(Vertex a, Vertex c) const {
   return found == entries.end() || found->other != c ? nullptr : &*found;
 }
 
-void PairEvidence::VisitCandidates(std::size_t num_nearest, const MatchingGraph& graph,
-                                   const Visit& visit) const {
+void PairEvidence::VisitCandidates(std::size_t num_nearest, std::size_t num_near,
+                                   const MatchingGraph& graph, const Visit& visit) const {
   struct Sample {
     VertexPair pair;
     bool is_of_lonely = false;
@@ -264,14 +265,18 @@ void PairEvidence::VisitCandidates(std::size_t num_nearest, const MatchingGraph&
       }
       if (!restrictions_.IsQuery(a)) continue;
       const bool is_lonely = graph.Degree(a) == 0 && graph.NumTestedOf(a) < kMaxTestsOfLonely;
-      std::size_t num_left = num_nearest;
-      for (const Vertex c : ranking_.NearestOf(a)) {
-        if (num_left == 0) break;
-        if (!restrictions_.Allows(a, c) || graph.IsTested(a, c)) continue;
-        --num_left;
-        if (Find(a, c) == nullptr)
-          samples_of_tasks[task].push_back({MakeVertexPair(a, c), is_lonely});
-      }
+      const auto draw = [&](const std::vector<Vertex>& list, std::size_t num_left,
+                            bool is_of_lonely) {
+        for (const Vertex c : list) {
+          if (num_left == 0) break;
+          if (!restrictions_.Allows(a, c) || graph.IsTested(a, c)) continue;
+          --num_left;
+          if (Find(a, c) != nullptr) continue;  // It has been visited.
+          samples_of_tasks[task].push_back({MakeVertexPair(a, c), is_of_lonely});
+        }
+      };
+      draw(ranking_.NearestOf(a), num_nearest, is_lonely);
+      for (const std::vector<Vertex>& near : priors_.Near(a)) draw(near, num_near, false);
     }
   });
   // Both images of a pair may have drawn it.
@@ -350,6 +355,7 @@ Cues PairEvidence::CuesOf(Vertex a, const Entry& entry, OwnTest own,
   const double rates[] = {rate(a), rate(c)};
   const auto num_common = static_cast<double>(entry.num_common);
   const auto num_failed = static_cast<double>(entry.num_failed);
+  const auto prior = priors_.Of(a, c);
   const auto log = [](std::uint32_t number) { return std::log1p(static_cast<double>(number)); };
   return {1,
           RelativeDistance(a, entry),
@@ -361,7 +367,11 @@ Cues PairEvidence::CuesOf(Vertex a, const Entry& entry, OwnTest own,
           num_common / (static_cast<double>(least_degree) + 1),
           num_failed / (num_failed + 2 * num_common + 1),
           std::min(rates[0], rates[1]),
-          std::max(rates[0], rates[1])};
+          std::max(rates[0], rates[1]),
+          prior[0],
+          prior[1],
+          prior[2],
+          prior[3]};
 }
 
 // 1 is usual. So it is where distances are none: scores of other programs may have any sign.

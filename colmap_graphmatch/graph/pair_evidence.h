@@ -8,6 +8,7 @@
 
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/graph/edge_model.h"
+#include "colmap_graphmatch/graph/image_priors.h"
 #include "colmap_graphmatch/graph/matching_graph.h"
 #include "colmap_graphmatch/graph/pair_restrictions.h"
 #include "colmap_graphmatch/graph/shared_tracks.h"
@@ -25,16 +26,17 @@ struct Candidate {
   bool is_of_lonely = false;
 };
 
-// What the ranking, the graph and the inliers say about pairs that may be tested. Of those with a
-// neighbour in common it is kept, and brought up to date with the tests. Memory: 32 bytes for each
-// of these pairs, and room to grow.
+// What the ranking, priors, the graph and the inliers say about pairs that may be tested. Of those
+// with a neighbour in common it is kept, and brought up to date with the tests. Memory: 32 bytes
+// for each of these pairs, and room to grow.
 class PairEvidence {
  public:
   // Tests after which an image without a neighbour is left to its likelihood.
   static constexpr std::size_t kMaxTestsOfLonely = 30;
 
   // All must outlive it.
-  PairEvidence(const Ranking& ranking, const PairRestrictions& restrictions, ThreadPool& threads);
+  PairEvidence(const Ranking& ranking, const ImagePriors& priors,
+               const PairRestrictions& restrictions, ThreadPool& threads);
   ~PairEvidence();
   PairEvidence(const PairEvidence&) = delete;
   PairEvidence& operator=(const PairEvidence&) = delete;
@@ -46,10 +48,11 @@ class PairEvidence {
 
   // Calls visit(task, candidate), for different tasks at once, for the pairs that the paper's two
   // moves could make, each once: those of images that have a neighbour in common (propagation), and
-  // of each image the num_nearest nearest untested ones (sampling). task: less than NumTasks(); of
-  // one task always the same pairs in the same order. graph: as of the last Add.
+  // of each image untested ones (sampling): the num_nearest nearest, and the first num_near in its
+  // sequence and by position. task: less than NumTasks(); of one task always the same pairs in the
+  // same order. graph: as of the last Add.
   using Visit = std::function<void(std::size_t task, const Candidate& candidate)>;
-  void VisitCandidates(std::size_t num_nearest, const MatchingGraph& graph,
+  void VisitCandidates(std::size_t num_nearest, std::size_t num_near, const MatchingGraph& graph,
                        const Visit& visit) const;
   std::size_t NumTasks() const { return num_tasks_; }
 
@@ -89,6 +92,7 @@ class PairEvidence {
   void ForEachTask(std::size_t size, const Body& body) const;
 
   const Ranking& ranking_;
+  const ImagePriors& priors_;
   const PairRestrictions& restrictions_;
   ThreadPool& threads_;
   std::size_t num_tasks_;

@@ -102,6 +102,7 @@ class Pipeline {
   RankedImages ranked_;            // Nothing, unless images are ranked.
   std::vector<ImageId> ids_;       // By vertex.
   PairRestrictions restrictions_;  // By vertex.
+  ImagePriors priors_;             // By vertex; nothing, unless the strategy looks at them.
   DetailsRecorder recorder_;
   PipelineResult result_;
 };
@@ -116,6 +117,9 @@ void Pipeline::Explore() {
   const std::vector<ImageRecord>& images = options_.RanksImages() ? ranked_.images : setup_.images;
   ids_ = Ids(images);
   restrictions_ = setup_.RestrictionsOf(images);
+  if (options_.RanksImages() && options_.strategy == PipelineOptions::Strategy::kBestFirst) {
+    priors_ = setup_.PriorsOf(images);
+  }
   BudgetedVerifier budgeted(
       verification_->Verifier(), options_.budget, setup_.threads.NumThreads(),
       [this] { return Seconds(); }, OrderOfTests());
@@ -145,8 +149,8 @@ PipelineResult Pipeline::Conclude() {
 }
 
 std::unique_ptr<PairProposer> Pipeline::NewProposer() {
-  return MakeProposer(
-      options_, {ids_, restrictions_, setup_.listed_pairs, ranked_.ranking.get(), setup_.threads});
+  return MakeProposer(options_, {ids_, restrictions_, setup_.listed_pairs, ranked_.ranking.get(),
+                                 priors_, setup_.threads});
 }
 
 KnownPairsPolicy Pipeline::ChooseKnown() {

@@ -94,6 +94,10 @@ PairRestrictions RunSetup::RestrictionsOf(const std::vector<ImageRecord>& run_im
   return restrictions;
 }
 
+ImagePriors RunSetup::PriorsOf(const std::vector<ImageRecord>& run_images) {
+  return ImagePriors(run_images, database->ReadPositions(), threads);
+}
+
 sqlite::LockPatience RunSetup::Patience() const {
   return {options.verification.lock_timeout, &stop};
 }

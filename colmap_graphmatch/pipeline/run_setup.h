@@ -8,6 +8,7 @@
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/base/types.h"
 #include "colmap_graphmatch/database/database.h"
+#include "colmap_graphmatch/graph/image_priors.h"
 #include "colmap_graphmatch/graph/pair_restrictions.h"
 #include "colmap_graphmatch/pipeline/observer.h"
 #include "colmap_graphmatch/pipeline/options.h"
@@ -40,6 +41,9 @@ class RunSetup {
 
   // Those of a run on these images, by vertex.
   PairRestrictions RestrictionsOf(const std::vector<ImageRecord>& run_images);
+
+  // What is known of these images beside their features, by vertex.
+  ImagePriors PriorsOf(const std::vector<ImageRecord>& run_images);
 
   sqlite::LockPatience Patience() const;
 

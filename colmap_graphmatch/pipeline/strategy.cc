@@ -117,7 +117,8 @@ std::unique_ptr<PairProposer> MakeProposer(const PipelineOptions& options,
     case Strategy::kBestFirst: {
       BestFirstOptions best_first = options.best_first;
       best_first.restrictions = input.restrictions;
-      return std::make_unique<BestFirstProposer>(best_first, *input.ranking, input.threads);
+      return std::make_unique<BestFirstProposer>(best_first, *input.ranking, input.priors,
+                                                 input.threads);
     }
     case Strategy::kExhaustive:
       return std::make_unique<AllPairsProposer>(input.restrictions);

@@ -7,6 +7,7 @@
 
 #include "colmap_graphmatch/base/thread_pool.h"
 #include "colmap_graphmatch/base/types.h"
+#include "colmap_graphmatch/graph/image_priors.h"
 #include "colmap_graphmatch/graph/options.h"
 #include "colmap_graphmatch/graph/pair_proposer.h"
 #include "colmap_graphmatch/graph/pair_restrictions.h"
@@ -42,10 +43,11 @@ struct ProposerInput {
   const PairRestrictions& restrictions;        // By vertex.
   const std::vector<ImagePair>& listed_pairs;  // Those of match_list_path.
   const Ranking* ranking;                      // Of the vertices; null unless images are ranked.
+  const ImagePriors& priors;                   // By vertex.
   ThreadPool& threads;
 };
 
-// The proposer of a run. ranking and threads must outlive it.
+// The proposer of a run. ranking, priors and threads must outlive it.
 std::unique_ptr<PairProposer> MakeProposer(const PipelineOptions& options,
                                            const ProposerInput& input);
 
