@@ -51,7 +51,8 @@ class MatchingTest : public ::testing::TestWithParam<MatchingTarget> {
 };
 
 std::string NameOfTarget(const ::testing::TestParamInfo<MatchingTarget>& info) {
-  std::string name = info.param.Name();
+  // Several of Highway's targets may have the same words for users.
+  std::string name = std::string(hwy::TargetName(info.param.target)) + "_" + info.param.Name();
   std::replace(name.begin(), name.end(), ' ', '_');
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
