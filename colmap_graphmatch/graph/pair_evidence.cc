@@ -5,6 +5,8 @@
 #include <iterator>
 #include <tuple>
 
+#include "colmap_graphmatch/graph/evidence_changes.h"
+
 namespace colmap_graphmatch {
 namespace {
 
@@ -26,20 +28,6 @@ std::uint32_t RankOf(Vertex listed, Vertex vertex, const Ranking& ranking) {
   return static_cast<std::uint32_t>(found != nearest.end()
                                         ? static_cast<std::size_t>(found - nearest.begin())
                                         : ranking.NumVertices());
-}
-
-// Calls visit for all that were tested with the vertex in vain.
-template <typename Visit>
-void VisitFailed(Vertex vertex, const MatchingGraph& graph, const Visit& visit) {
-  auto neighbor = graph.Neighbors(vertex).begin();
-  const auto end = graph.Neighbors(vertex).end();
-  for (const Vertex tested : graph.Tested(vertex)) {
-    if (neighbor != end && *neighbor == tested) {
-      ++neighbor;
-    } else {
-      visit(tested);
-    }
-  }
 }
 
 // Images that are an edge of one of the two and were tested in vain with the other.
@@ -78,86 +66,6 @@ struct PairEvidence::Entry {
   std::uint32_t most_shared = 0;  // and of the one with the most.
 };
 
-// What new tests change for the pairs that one vertex owns.
-class PairEvidence::Changes {
- public:
-  struct Change {
-    bool is_touched = false;
-    std::uint32_t num_common = 0;
-    std::uint32_t num_failed = 0;
-    std::uint32_t num_shared = 0;
-    std::uint32_t most_shared = 0;
-  };
-
-  // added: the new tests alone.
-  Changes(const PairEvidence& evidence, const MatchingGraph& added, const MatchingGraph& graph,
-          const SharedTracks& tracks)
-      : evidence_(evidence),
-        added_(added),
-        graph_(graph),
-        tracks_(tracks),
-        changes_(graph.NumVertices()) {}
-
-  const Change& To(Vertex c) const { return changes_[c]; }
-
-  // The other vertices of pairs that change, ascending.
-  const std::vector<Vertex>& WalkFrom(Vertex a) {
-    for (const Vertex vertex : touched_) changes_[vertex] = {};
-    touched_.clear();
-    // By both tests of a path a - b - c, at least one of which is new.
-    for (const Vertex b : graph_.Neighbors(a)) {
-      const MatchingGraph& of_b = IsNew(a, b) ? graph_ : added_;
-      AddCommon(a, b, of_b.Neighbors(b));
-      VisitFailed(b, of_b, [&](Vertex c) { AddFailed(a, c); });
-    }
-    VisitFailed(a, graph_, [&](Vertex b) {
-      const MatchingGraph& of_b = IsNew(a, b) ? graph_ : added_;
-      for (const Vertex c : of_b.Neighbors(b)) AddFailed(a, c);
-    });
-    std::sort(touched_.begin(), touched_.end());
-    return touched_;
-  }
-
- private:
-  bool IsNew(Vertex a, Vertex b) const {
-    return added_.NumTestedOf(a) > 0 && added_.IsTested(a, b);
-  }
-
-  Change& Touch(Vertex vertex) {
-    Change& change = changes_[vertex];
-    if (!change.is_touched) {
-      change.is_touched = true;
-      touched_.push_back(vertex);
-    }
-    return change;
-  }
-
-  void AddCommon(Vertex a, Vertex b, const std::vector<Vertex>& neighbors) {
-    if (neighbors.empty()) return;
-    const SharedTracks::Features& with_a = tracks_.Inliers(b, a);
-    for (const Vertex c : neighbors) {
-      if (c == a || !evidence_.Owns(a, c)) continue;
-      Change& change = Touch(c);
-      ++change.num_common;
-      const auto num_shared =
-          static_cast<std::uint32_t>(SharedTracks::CountShared(with_a, tracks_.Inliers(b, c)));
-      change.num_shared += num_shared;
-      change.most_shared = std::max(change.most_shared, num_shared);
-    }
-  }
-
-  void AddFailed(Vertex a, Vertex c) {
-    if (c != a && evidence_.Owns(a, c)) ++Touch(c).num_failed;
-  }
-
-  const PairEvidence& evidence_;
-  const MatchingGraph& added_;
-  const MatchingGraph& graph_;
-  const SharedTracks& tracks_;
-  std::vector<Change> changes_;  // By the other vertex.
-  std::vector<Vertex> touched_;
-};
-
 PairEvidence::PairEvidence(const Ranking& ranking, const ImagePriors& priors,
                            const PairRestrictions& restrictions, ThreadPool& threads)
     : ranking_(ranking),
@@ -191,7 +99,7 @@ void PairEvidence::Add(const std::vector<TestedVertexPair>& tests, const Matchin
   MatchingGraph added(graph.NumVertices());
   added.Add(tests);
   ForEachTask(graph.NumVertices(), [&](std::size_t, std::size_t begin, std::size_t end) {
-    Changes changes(*this, added, graph, tracks);
+    EvidenceChanges changes(restrictions_, added, graph, tracks);
     for (std::size_t i = begin; i < end; ++i) {
       const auto a = static_cast<Vertex>(i);
       if (restrictions_.IsQuery(a)) Update(a, changes.WalkFrom(a), changes, graph);
@@ -199,14 +107,14 @@ void PairEvidence::Add(const std::vector<TestedVertexPair>& tests, const Matchin
   });
 }
 
-void PairEvidence::Update(Vertex a, const std::vector<Vertex>& changed, const Changes& changes,
-                          const MatchingGraph& graph) {
+void PairEvidence::Update(Vertex a, const std::vector<Vertex>& changed,
+                          const EvidenceChanges& changes, const MatchingGraph& graph) {
   std::vector<Entry>& entries = entries_[a];
   const std::size_t num_old = entries.size();
   std::size_t i = 0;
   for (const Vertex c : changed) {
     while (i < num_old && entries[i].other < c) ++i;
-    const Changes::Change& change = changes.To(c);
+    const EvidenceChanges::Change& change = changes.To(c);
     if (i < num_old && entries[i].other == c) {
       entries[i].num_common += change.num_common;
       entries[i].num_failed += change.num_failed;
@@ -238,7 +146,7 @@ PairEvidence::Entry PairEvidence::MakeEntry(Vertex a, Vertex c, const MatchingGr
 }
 
 const PairEvidence::Entry* PairEvidence::Find(Vertex a, Vertex c) const {
-  if (!Owns(a, c)) return Owns(c, a) ? Find(c, a) : nullptr;
+  if (!restrictions_.Owns(a, c)) return restrictions_.Owns(c, a) ? Find(c, a) : nullptr;
   const std::vector<Entry>& entries = entries_[a];
   const auto found =
       std::lower_bound(entries.begin(), entries.end(), c,

@@ -16,6 +16,8 @@
 
 namespace colmap_graphmatch {
 
+class EvidenceChanges;
+
 // An untested pair and what is known of it.
 struct Candidate {
   VertexPair pair;
@@ -67,16 +69,10 @@ class PairEvidence {
 
  private:
   struct Entry;
-  class Changes;
   // Of the pair itself, which the graph has and its cues must not know.
   enum class OwnTest { kNone, kNoEdge, kEdge };
 
-  // Whether the pair is kept with a: with the query if that is one of them alone, otherwise with
-  // the smaller one. So what has no query costs nothing.
-  bool Owns(Vertex a, Vertex c) const {
-    return restrictions_.IsQuery(a) && (a < c || !restrictions_.IsQuery(c));
-  }
-  void Update(Vertex a, const std::vector<Vertex>& changed, const Changes& changes,
+  void Update(Vertex a, const std::vector<Vertex>& changed, const EvidenceChanges& changes,
               const MatchingGraph& graph);
   const Entry* Find(Vertex a, Vertex c) const;
   // Without neighbours in common.

@@ -26,6 +26,10 @@ struct PairRestrictions {
 
   bool Allows(Vertex a, Vertex b) const { return (IsQuery(a) || IsQuery(b)) && !SameFrame(a, b); }
 
+  // Whether what is known of a pair is kept with a: with the query if that is one of them alone,
+  // otherwise with the smaller one. So what has no query costs nothing.
+  bool Owns(Vertex a, Vertex b) const { return IsQuery(a) && (a < b || !IsQuery(b)); }
+
   // Names the values of all fields by their lengths and checksums.
   std::string Key() const;
 };
