@@ -300,10 +300,11 @@ fresh small '100%25?mode=ro#1&a=b'
 works 'A path with `%`, `?`, `#`'
 fresh small $'two\nlines'
 works 'A path with a newline'
-# name_images EXPRESSION: what all images are called, in SQL; the id is added.
+# name_images EXPRESSION: what all images are called, in SQL. A number and the place follow: as in the plain names, which
+# number the images of each place, and tell the choice of pairs so.
 name_images() {
   fresh
-  change "UPDATE images SET name = $1 || image_id"
+  change "UPDATE images SET name = $1 || ((image_id - 1) % 6) || char(97 + (image_id - 1) / 6)"
 }
 name_images "' my ' || char(39) || 'own' || char(39) || ' \"photo\"  '"
 works 'Image names with spaces and quotes'
