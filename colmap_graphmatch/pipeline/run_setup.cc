@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "colmap_graphmatch/base/errors.h"
 #include "colmap_graphmatch/files/pair_list.h"
 #include "colmap_graphmatch/files/text_file.h"
 
@@ -95,7 +96,16 @@ PairRestrictions RunSetup::RestrictionsOf(const std::vector<ImageRecord>& run_im
 }
 
 ImagePriors RunSetup::PriorsOf(const std::vector<ImageRecord>& run_images) {
-  return ImagePriors(run_images, database->ReadPositions(), threads);
+  std::map<ImageId, PositionPrior> positions;
+  try {
+    positions = database->ReadPositions();
+  } catch (const DatabaseLockedError&) {
+    throw;
+  } catch (const DatabaseError& error) {
+    // Nothing depends on them.
+    messages.warn(std::string(error.what()) + " The run goes on without positions of images.");
+  }
+  return ImagePriors(run_images, positions, threads);
 }
 
 sqlite::LockPatience RunSetup::Patience() const {

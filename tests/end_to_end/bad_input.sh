@@ -200,6 +200,10 @@ change 'ALTER TABLE two_view_geometries DROP COLUMN qvec; ALTER TABLE two_view_g
 says 0 'Only the columns `qvec` and `tvec` are missing: a COLMAP shortly before 3.8' "${run[@]}"
 [[ $(wc -l <"$work/pairs.after") == $(wc -l <"$work/small.pairs") ]] || fail 'pairs are missing'
 fresh
+change 'CREATE VIEW pose_priors AS SELECT image_id, x'"''"' AS position, 0 AS coordinate_system FROM images'
+piece='The run goes on without positions of images.' says 0 'Positions of images (`pose_priors`) cannot be read' "${run[@]}"
+expect_results small
+fresh
 truncate -s 70000 "$database"
 piece='database disk image is malformed. The file is damaged: `sqlite3 FILE .recover` may save its contents.' \
   advice='copy it again' says 2 'The file is cut off, e.g. an incomplete copy' "${run[@]}"

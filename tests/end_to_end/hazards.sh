@@ -299,8 +299,9 @@ wait "$pid" || code=$?
 fresh big
 mkfifo pipe
 exec 4<>pipe
-"${run[@]}" --GraphMatching.pair_log pipe --GraphMatching.export_pairs pipe --GraphMatching.export_graph graph.dot \
-  --GraphMatching.report pipe >"$work/output.txt" 2>&1 &
+# What it writes of all pairs is more than a pipe holds.
+"${run[@]}" --GraphMatching.strategy exhaustive --GraphMatching.pair_log pipe --GraphMatching.export_pairs pipe \
+  --GraphMatching.export_graph graph.dot --GraphMatching.report pipe >"$work/output.txt" 2>&1 &
 pid=$!
 wait_for grep -q 'Time   ' "$work/output.txt"
 sleep 0.5

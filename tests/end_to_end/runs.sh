@@ -60,7 +60,8 @@ pid=$!
 while (($(count_tested "$work/two.db") == 0)); do sleep 0.05; done
 expect_exit 3 "Another graphmatch_matcher works on this database: it holds $work/two.db.graphmatch (held by process $pid" \
   "$matcher" --database_path "$work/link.db" --colmap_path "$fake" --GraphMatching.lock_timeout 0.3
-expect_exit 0 'Pairs tested       0 of 780' "$matcher" --database_path "$work/two.db" --colmap_path "$fake"
+expect_exit 0 'Pairs tested       0 of 780' "$matcher" --database_path "$work/two.db" --colmap_path "$fake" \
+  --GraphMatching.lock_timeout 600
 grep -q 'waiting for it' "$work/output.txt" || fail "no word on the wait"
 wait "$pid" || { cat "$work/two.txt"; fail "the first of two runs"; }
 tested_pairs "$work/two.db" | cmp - "$work/undisturbed.txt"
