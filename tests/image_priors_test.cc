@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "colmap_graphmatch/base/random.h"
 
 namespace colmap_graphmatch {
 namespace {
@@ -106,6 +110,40 @@ TEST(ImagePriors, ImagesAtOnePlaceAndFarAwayHaveNumbers) {
     }
   }
   EXPECT_LT(priors.Of(0, 1)[1], priors.Of(0, 6)[1]);
+}
+
+TEST(ImagePriors, TheNearestAreThoseOfTheDefinition) {
+  Random random({6});
+  std::vector<PositionPrior> positions(200);
+  for (PositionPrior& prior : positions) {
+    prior = Cartesian(random.Uniform());
+    prior.position[1] = random.Uniform();
+    prior.position[2] = random.Uniform();
+  }
+  const ImagePriors priors = PriorsAt(positions);
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    std::vector<std::pair<double, Vertex>> others;
+    for (std::size_t j = 0; j < positions.size(); ++j) {
+      const auto& a = positions[i].position;
+      const auto& b = positions[j].position;
+      if (j != i) others.emplace_back(std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]), j);
+    }
+    std::sort(others.begin(), others.end());
+    std::vector<Vertex> nearest;
+    for (std::size_t k = 0; k < 8; ++k) nearest.push_back(others[k].second);
+    EXPECT_EQ(priors.Near(static_cast<Vertex>(i))[1], nearest) << i;
+  }
+}
+
+// Where many images are at one point, the others are nearer and farther still.
+TEST(ImagePriors, ACameraThatStandsKeepsDistances) {
+  std::vector<PositionPrior> positions(10, Cartesian(0));
+  for (int i = 1; i <= 20; ++i) positions.push_back(Cartesian(i));
+  const ImagePriors priors = PriorsAt(positions);
+  EXPECT_EQ(priors.Of(0, 1)[1], 0);
+  EXPECT_LT(priors.Of(0, 10)[1], 0.5);
+  EXPECT_GT(priors.Of(0, 29)[1], 3 * priors.Of(0, 10)[1]);
+  EXPECT_THAT(priors.Near(20)[1], ::testing::UnorderedElementsAre(16, 17, 18, 19, 21, 22, 23, 24));
 }
 
 TEST(ImagePriors, SequencesAreNamesThatDifferInTheirLastNumber) {

@@ -5,8 +5,8 @@
 
 namespace colmap_graphmatch {
 
-// Where an image was taken, as far as its database knows before any reconstruction. The numbers may
-// be any, NaN and infinite ones too.
+// Where an image was taken, as far as its database knows before any reconstruction. Coordinates
+// may be any numbers, NaN and infinite ones too.
 struct PositionPrior {
   enum class System : std::uint8_t {
     kGeographic,  // Latitude and longitude in degrees, altitude in metres (WGS84).

@@ -78,8 +78,8 @@ class Database {
   std::map<ImageId, std::uint32_t> ReadFrames();
 
   // Where images were taken, of those of which it is known: GPS, or what a user has written. Of
-  // COLMAP before 3.10, which does not say what they are, the numbers are taken for GPS if all can
-  // be.
+  // COLMAP before 3.10, which does not say what they are, the numbers are taken for GPS if most
+  // can be.
   std::map<ImageId, PositionPrior> ReadPositions();
 
   // The pairs that have a row in `two_view_geometries`, ascending; keys that stand for no pair are

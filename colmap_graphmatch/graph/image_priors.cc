@@ -19,6 +19,8 @@ constexpr std::size_t kNumNearPositions = 8;
 constexpr std::size_t kUsualNeighbor = 5;
 // GPS is no better, in metres.
 constexpr double kBestGps = 1;
+// As good as none, where that many images are at one point.
+constexpr double kNoDistance = std::numeric_limits<double>::min();
 // Beyond it all are equally far.
 constexpr double kMostRelativeDistance = 1e4;
 
@@ -74,8 +76,7 @@ ImagePriors::ImagePriors(const std::vector<ImageRecord>& images,
     point.system = found->second.system;
     const bool is_geographic = point.system == PositionPrior::System::kGeographic;
     point.position = is_geographic ? ToCartesian(found->second.position) : found->second.position;
-    point.usual_distance = std::max(found->second.accuracy,
-                                    is_geographic ? kBestGps : std::numeric_limits<double>::min());
+    point.usual_distance = std::max(found->second.accuracy, is_geographic ? kBestGps : kNoDistance);
   }
   FindNeighbors(threads);
 }
@@ -117,21 +118,62 @@ void ImagePriors::FindSequences(const std::vector<ImageRecord>& images) {
 }
 
 void ImagePriors::FindNeighbors(ThreadPool& threads) {
-  threads.ParallelFor(points_.size(), [&](std::size_t i) {
-    const auto a = static_cast<Vertex>(i);
-    std::vector<std::pair<double, Vertex>> others;
-    for (std::size_t j = 0; j < points_.size(); ++j) {
-      const auto b = static_cast<Vertex>(j);
-      if (a != b && HaveDistance(a, b)) others.emplace_back(Distance(a, b), b);
-    }
-    if (others.empty()) return;
-    const std::size_t num = std::min(kNumNearPositions, others.size());
-    std::partial_sort(others.begin(), others.begin() + static_cast<std::ptrdiff_t>(num),
-                      others.end());
-    double& usual = points_[i].usual_distance;
-    usual = std::max(usual, others[std::min(kUsualNeighbor, num) - 1].first);
-    for (std::size_t k = 0; k < num; ++k) near_[i][1].push_back(others[k].second);
+  std::vector<Vertex> sorted;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (points_[i].is_known) sorted.push_back(static_cast<Vertex>(i));
+  }
+  std::sort(sorted.begin(), sorted.end(), [&](Vertex a, Vertex b) {
+    return std::tie(points_[a].system, points_[a].position, a) <
+           std::tie(points_[b].system, points_[b].position, b);
   });
+  threads.ParallelFor(sorted.size(), [&](std::size_t i) {
+    const std::vector<std::pair<double, Vertex>> nearest = NearestOf(i, sorted);
+    if (nearest.empty()) return;
+    double& usual = points_[sorted[i]].usual_distance;
+    usual = std::max(usual, nearest[std::min(kUsualNeighbor, nearest.size()) - 1].first);
+    for (const auto& [distance, other] : nearest) near_[sorted[i]][1].push_back(other);
+  });
+  SetMissingUsualDistances();
+}
+
+std::vector<std::pair<double, Vertex>> ImagePriors::NearestOf(
+    std::size_t place, const std::vector<Vertex>& sorted) const {
+  const Vertex vertex = sorted[place];
+  std::vector<std::pair<double, Vertex>> nearest;  // Ascending.
+  // Whether what follows in its direction may be nearer than the last of them.
+  const auto goes_on = [&](Vertex other) {
+    if (!HaveDistance(vertex, other)) return false;
+    if (nearest.size() == kNumNearPositions) {
+      const double apart = std::abs(points_[vertex].position[0] - points_[other].position[0]);
+      if (nearest.back().first == 0 || apart > nearest.back().first) return false;
+    }
+    const std::pair<double, Vertex> found(Distance(vertex, other), other);
+    nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), found), found);
+    if (nearest.size() > kNumNearPositions) nearest.pop_back();
+    return true;
+  };
+  std::size_t before = place;
+  std::size_t after = place + 1;
+  bool has_before = true;
+  bool has_after = true;
+  while (has_before || has_after) {
+    has_before = has_before && before > 0 && goes_on(sorted[--before]);
+    has_after = has_after && after < sorted.size() && goes_on(sorted[after++]);
+  }
+  return nearest;
+}
+
+void ImagePriors::SetMissingUsualDistances() {
+  std::vector<double> known;
+  for (const Point& point : points_) {
+    if (point.usual_distance > kNoDistance) known.push_back(point.usual_distance);
+  }
+  if (known.empty()) return;
+  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
+  std::nth_element(known.begin(), middle, known.end());
+  for (Point& point : points_) {
+    if (point.is_known && point.usual_distance <= kNoDistance) point.usual_distance = *middle;
+  }
 }
 
 bool ImagePriors::HaveDistance(Vertex a, Vertex b) const {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "colmap_graphmatch/base/position_prior.h"
@@ -24,7 +25,7 @@ class ImagePriors {
 
   // images: by vertex. A position that cannot be, and latitude and longitude 0, count for none;
   // altitudes of GPS are not looked at. A sequence is three names or more that differ only in the
-  // last number of the file's name. Takes O(P^2) for P images with a position.
+  // last number of the file's name.
   ImagePriors(const std::vector<ImageRecord>& images,
               const std::map<ImageId, PositionPrior>& positions, ThreadPool& threads);
 
@@ -52,6 +53,12 @@ class ImagePriors {
 
   void FindSequences(const std::vector<ImageRecord>& images);
   void FindNeighbors(ThreadPool& threads);
+  // Distances and vertices of images near the one at this place of a list that is sorted by
+  // position: it is left where its first coordinate alone is too far off.
+  std::vector<std::pair<double, Vertex>> NearestOf(std::size_t place,
+                                                   const std::vector<Vertex>& sorted) const;
+  // Where all neighbours are at the same point: what is usual elsewhere.
+  void SetMissingUsualDistances();
   bool HaveDistance(Vertex a, Vertex b) const;
   double Distance(Vertex a, Vertex b) const;
 
