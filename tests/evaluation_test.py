@@ -142,6 +142,9 @@ class VocabularyTreeTest(unittest.TestCase):
                 "  image_id=1, image_name=a, b.jpg, score=2.5e-01\n")
         self.assertEqual(vocabulary_tree.parse_answers(text, {1: "a, b.jpg", 2: "c.jpg"}),
                          [("a, b.jpg", "c.jpg", 0.25), ("c.jpg", "a, b.jpg", 0.25)])
+        logged = "".join(f"I20261128 22:49:53.558591  9697 vocab_tree.cc:264] {line}\n"
+                         for line in text.split("\n"))
+        self.assertEqual(len(vocabulary_tree.parse_answers(logged, {1: "a, b.jpg", 2: "c.jpg"})), 2)
         with self.assertRaises(EvaluationError):
             vocabulary_tree.parse_answers("  image_id=1, image_name=a, score=1\n", {1: "a"})
 

@@ -8,7 +8,8 @@ from .database import open_readonly
 from .errors import EvaluationError
 from .runs import Step, run_logged, stamp_of
 
-ANSWER = re.compile(r"\s*image_id=(\d+), image_name=(.*), score=([-+0-9.eE]+)\s*$")
+# Later versions than 3.8 write what glog puts before a line.
+ANSWER = re.compile(r"(?:[IWE]\d{8} [^\]]*\])?\s*image_id=(\d+), image_name=(.*), score=([-+0-9.eE]+)\s*$")
 QUERY = re.compile(r"Querying for image (.*) \[(\d+)/(\d+)\]")
 
 # Images in a ranked list at most.
