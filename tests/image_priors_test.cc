@@ -138,7 +138,10 @@ TEST(ImagePriors, TheNearestAreThoseOfTheDefinition) {
 // Where many images are at one point, the others are nearer and farther still.
 TEST(ImagePriors, ACameraThatStandsKeepsDistances) {
   std::vector<PositionPrior> positions(10, Cartesian(0));
-  for (int i = 1; i <= 20; ++i) positions.push_back(Cartesian(i));
+  for (int i = 1; i <= 20; ++i) positions.push_back(Cartesian(100 * i));
+  // Those without a position, and GPS, have no say.
+  positions.insert(positions.end(), 50, Cartesian(std::numeric_limits<double>::quiet_NaN()));
+  for (int i = 0; i < 50; ++i) positions.push_back(Geographic(48 + i * 1e-6, 11));
   const ImagePriors priors = PriorsAt(positions);
   EXPECT_EQ(priors.Of(0, 1)[1], 0);
   EXPECT_LT(priors.Of(0, 10)[1], 0.5);

@@ -164,15 +164,20 @@ std::vector<std::pair<double, Vertex>> ImagePriors::NearestOf(
 }
 
 void ImagePriors::SetMissingUsualDistances() {
+  // Of GPS there is always one (kBestGps).
+  const auto is_cartesian = [](const Point& point) {
+    return point.is_known && point.system == PositionPrior::System::kCartesian;
+  };
   std::vector<double> known;
   for (const Point& point : points_) {
-    if (point.usual_distance > kNoDistance) known.push_back(point.usual_distance);
+    if (is_cartesian(point) && point.usual_distance > kNoDistance)
+      known.push_back(point.usual_distance);
   }
   if (known.empty()) return;
   const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
   std::nth_element(known.begin(), middle, known.end());
   for (Point& point : points_) {
-    if (point.is_known && point.usual_distance <= kNoDistance) point.usual_distance = *middle;
+    if (is_cartesian(point) && point.usual_distance <= kNoDistance) point.usual_distance = *middle;
   }
 }
 
