@@ -3,13 +3,7 @@
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/common.sh"
 
-fake=$build/tests/fake_colmap
-database="$work/photos of a place.db"
-"$build/tests/make_synthetic_database" "$database" 4 10
-cp "$database" "$work/untouched.db"
-export TMPDIR=$work/tmp
-mkdir -p "$TMPDIR"
-run=("$matcher" --database_path "$database" --colmap_path "$fake")
+use_test_double
 
 echo "== Options"
 expect_exit 0 'graphmatch_matcher --help-all' "$matcher" -h

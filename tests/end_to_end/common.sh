@@ -16,6 +16,18 @@ fail() {
   exit 1
 }
 
+# use_test_double: the database of four places of ten images each, which untouched.db is a copy of, and the command
+# that matches it with the test double as COLMAP.
+use_test_double() {
+  fake=$build/tests/fake_colmap
+  database="$work/photos of a place.db"
+  "$build/tests/make_synthetic_database" "$database" 4 10
+  cp "$database" "$work/untouched.db"
+  export TMPDIR=$work/tmp
+  mkdir -p "$TMPDIR"
+  run=("$matcher" --database_path "$database" --colmap_path "$fake")
+}
+
 # expect_exit CODE TEXT COMMAND...: the command ends with the code, and its output contains the text.
 expect_exit() {
   local expected=$1 text=$2 code=0
